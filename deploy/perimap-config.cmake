@@ -1,7 +1,8 @@
 # find_package(perimap [COMPONENTS client core]) gives
 # perimap::client the C types of perimap.idl, perimap_mesh.idl and perimap_tool.idl, made by Cyclone DDS' compiler for
 #                    the project that asks,
-#                    with perimap_client.hpp, perimap_mesh_client.hpp, perimap_publisher_watch.hpp and perimap_use.hpp;
+#                    with perimap_client.hpp, perimap_mesh_client.hpp, perimap_publisher_watch.hpp,
+#                    perimap_tool_client.hpp and perimap_use.hpp;
 #                    the project's languages must be C and CXX
 # perimap::core what perimapd computes with, without devices, files and DDS; its parts are perimap::core_phase and so on
 # A component that is named must be there. Without names: each whose own dependencies are installed.

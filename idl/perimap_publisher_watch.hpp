@@ -4,8 +4,8 @@
 //   const auto heard = watch.hear(*surface, info.publication_handle, now_ns);
 //   if (heard == perimap::client::Hearing::kUse) use(*surface); else show(describe(heard));
 //
-// Needs C++17, the C types that idlc makes of perimap.idl and perimap_mesh.idl, and nothing else. It keeps no memory
-// but its own and calls nothing; one thread at a time.
+// Needs C++17, the C types that idlc makes of perimap.idl, perimap_mesh.idl and perimap_tool.idl, and nothing else. It
+// keeps no memory but its own and calls nothing; one thread at a time.
 //
 // In a domain without DDS Security anyone can publish under any name. Who does is told by the writer, which DDS knows
 // (dds_sample_info_t::publication_handle; 0 where it is not known), and by the run that each sample names. Nothing is
@@ -20,12 +20,14 @@
 
 #include <perimap.h>
 #include <perimap_mesh.h>
+#include <perimap_tool.h>
 
 #include <array>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
+#include <limits>
 
 namespace perimap::client {
 
@@ -74,6 +76,10 @@ class PublisherWatch {
     return hear({sample.run_id, kMeshes, writer}, {0, sample.sample_sequence, sample.time_ns}, plausible(sample),
                 now_ns);
   }
+  Hearing hear(const perimap_ToolDistance& sample, std::uint64_t writer, std::int64_t now_ns) noexcept {
+    return hear({sample.run_id, kTools, writer}, {lane_of_tool(sample, now_ns), sample.sample_sequence, sample.time_ns},
+                plausible(sample), now_ns);
+  }
   Hearing hear(const perimap_Phase& sample, std::uint64_t writer, std::int64_t now_ns) noexcept {
     return hear({sample.run_id, kPhases, writer}, {of_clock(sample.stream), sample.sample_sequence, sample.time_ns},
                 std::isfinite(sample.cardiac_phase_rad) && std::isfinite(sample.cardiac_phase_rate_rad_per_s), now_ns);
@@ -95,7 +101,10 @@ class PublisherWatch {
   }
 
  private:
-  enum Topic : std::size_t { kSurfaces, kModels, kMeshes, kPhases, kStatuses, kTopics };
+  enum Topic : std::size_t { kSurfaces, kModels, kMeshes, kPhases, kStatuses, kTools, kTopics };
+  // Each tool has sequence numbers of its own. Of more of them that are heard in turn none is followed.
+  static constexpr std::size_t kToolLanes = 16;
+  static constexpr std::size_t kStreams = 2;
   static constexpr std::int64_t kMeshAlone_ns = 3 * kAlone_ns;  // one comes a second
   static constexpr std::size_t kRemembered = 4;
   static constexpr std::int64_t kForgotten_ns = 60 * kAlone_ns;
@@ -140,6 +149,30 @@ class PublisherWatch {
     std::int64_t time_ns = 0;
     std::int64_t heard_ns = 0;
   };
+  struct Tool {
+    std::array<char, sizeof(perimap_ToolDistance::tool)> name{};
+    std::int64_t heard_ns = std::numeric_limits<std::int64_t>::min();
+  };
+
+  // Of the tool's name; that of the tool that was heard least lately where all are taken.
+  std::size_t lane_of_tool(const perimap_ToolDistance& sample, std::int64_t now_ns) noexcept {
+    std::size_t oldest = 0;
+    for (std::size_t i = 0; i < kToolLanes; ++i) {
+      Tool& tool = tools_[i];
+      if (std::strncmp(tool.name.data(), sample.tool, tool.name.size()) == 0) {
+        tool.heard_ns = now_ns;
+        return i;
+      }
+      if (tool.heard_ns < tools_[oldest].heard_ns) oldest = i;
+    }
+    Tool& taken = tools_[oldest];
+    taken.heard_ns = now_ns;
+    std::memcpy(taken.name.data(), sample.tool, taken.name.size());
+    lane(kTools, oldest) = {};
+    return oldest;
+  }
+
+  Lane& lane(Topic topic, std::size_t stream) noexcept { return lanes_[kStreams * topic + stream]; }
 
   static std::size_t of_clock(const char* stream) noexcept { return std::strcmp(stream, "clock") == 0 ? 1 : 0; }
 
@@ -182,6 +215,19 @@ class PublisherWatch {
     return true;
   }
 
+  // What is told as known is a number; what is not is none, and harms nobody.
+  static bool plausible(const perimap_ToolDistance& sample) noexcept {
+    if (sample.valid_until_ns < sample.release_time_ns) return false;
+    if (sample.tip_known && !(finite(sample.tip_W_mm) && finite(sample.tip_velocity_W_mm_per_s))) return false;
+    for (std::size_t h = 0; h < perimap_TOOL_HORIZONS; ++h) {
+      if (sample.states[h] > perimap_TOOL_GOOD) return false;
+      if (sample.states[h] == perimap_TOOL_INVALID) continue;
+      if (!std::isfinite(sample.distances_mm[h]) || !std::isfinite(sample.rates_mm_per_s[h])) return false;
+      if (!(sample.deviations_mm[h] >= 0.0) || !std::isfinite(sample.deviations_mm[h])) return false;
+    }
+    return true;
+  }
+
   // Of two times that may be anything.
   static std::int64_t difference(std::int64_t a, std::int64_t b) noexcept {
     return static_cast<std::int64_t>(static_cast<std::uint64_t>(a) - static_cast<std::uint64_t>(b));
@@ -189,17 +235,17 @@ class PublisherWatch {
 
   // Whether the sample follows upon the one before of its lane, which it then takes the place of.
   bool follows(Topic topic, const Place& place, std::int64_t now_ns) noexcept {
-    Lane& lane = lanes_[2 * topic + place.stream];
+    Lane& before = lane(topic, place.stream);
     bool good = true;
-    if (lane.known) {
-      const std::int64_t passed_ns = now_ns - lane.heard_ns;
+    if (before.known) {
+      const std::int64_t passed_ns = now_ns - before.heard_ns;
       const auto passed_s = static_cast<std::uint64_t>(passed_ns > 0 ? passed_ns / 1'000'000'000 : 0);
-      const std::int64_t off_ns = difference(difference(place.time_ns, lane.time_ns), passed_ns);
-      good = place.sequence > lane.sequence &&
-             place.sequence - lane.sequence <= kSequenceSlack + passed_s * kMostSamplesPerSecond &&
+      const std::int64_t off_ns = difference(difference(place.time_ns, before.time_ns), passed_ns);
+      good = place.sequence > before.sequence &&
+             place.sequence - before.sequence <= kSequenceSlack + passed_s * kMostSamplesPerSecond &&
              off_ns > -kTimeSlack_ns && off_ns < kTimeSlack_ns;
     }
-    lane = {true, place.sequence, place.time_ns, now_ns};
+    before = {true, place.sequence, place.time_ns, now_ns};
     return good;
   }
 
@@ -253,7 +299,8 @@ class PublisherWatch {
   std::int64_t alone_since_ns_ = 0;  // since then all that was heard was of the current one, and followed
   Hearing why_not_ = Hearing::kListening;
   std::array<std::int64_t, kTopics> topic_since_ns_{};  // since then its writer is known
-  std::array<Lane, 2 * kTopics> lanes_{};
+  std::array<Tool, kToolLanes> tools_{};
+  std::array<Lane, kStreams * kTools + kToolLanes> lanes_{};  // of tools, the last topic, by tool
 };
 
 }  // namespace perimap::client

@@ -8,27 +8,6 @@
 namespace perimap {
 namespace {
 
-std::string_view reason_words(std::uint8_t reason) noexcept {
-  switch (reason) {
-    case perimap_TOOL_REASON_NONE:
-      return "";
-    case perimap_TOOL_REASON_NOT_CALIBRATED:
-      return "its tip is not calibrated";
-    case perimap_TOOL_REASON_NOT_SEEN:
-      return "the tracker does not see it";
-    case perimap_TOOL_REASON_TOO_OLD:
-      return "the tracker says nothing new of it";
-    case perimap_TOOL_REASON_SURFACE:
-      return "the surface is not good";
-    case perimap_TOOL_REASON_NO_SURFACE:
-      return "there is no continuous surface";
-    case perimap_TOOL_REASON_BEYOND_EDGE:
-      return "beside what is known of the surface";
-    default:
-      return "for a reason that is not known here";
-  }
-}
-
 std::vector<double> list(const double (&values)[3]) { return {std::begin(values), std::end(values)}; }
 
 }  // namespace
@@ -58,13 +37,16 @@ std::string_view tool_reason_name(std::uint8_t reason) noexcept {
   }
 }
 
-std::string tool_words(const perimap_ToolDistance& tool) {
-  const bool usable = tool.state == perimap_TOOL_GOOD || tool.state == perimap_TOOL_DEGRADED;
-  if (!usable) return fmt::format("{}: {}", tool.tool, reason_words(tool.reason));
-  std::string text = fmt::format("{} {}{:.1f} +- {:.1f} mm, {:+.0f} mm/s", tool.tool, tool.touches ? "TOUCHES, " : "",
-                                 tool.distances_mm[0], tool.deviations_mm[0], tool.rates_mm_per_s[0]);
-  if (tool.state == perimap_TOOL_DEGRADED) text += fmt::format(" ({})", reason_words(tool.reason));
+std::string tool_words(std::string_view name, const client::ToolAtInstant& at) {
+  if (at.refusal != client::ToolRefusal::kNone) return fmt::format("{}: {}", name, client::describe(at));
+  std::string text = fmt::format("{} {}{:.1f} +- {:.1f} mm, {:+.0f} mm/s", name, at.touches ? "TOUCHES, " : "",
+                                 at.distance_mm, at.deviation_mm, at.rate_mm_per_s);
+  if (at.state == perimap_TOOL_DEGRADED) text += fmt::format(" ({})", client::describe(at));
   return text;
+}
+
+std::string tool_words(const perimap_ToolDistance& tool) {
+  return tool_words(tool.tool, client::distance_at(tool, tool.time_ns, tool.time_ns));
 }
 
 nlohmann::ordered_json tool_json(const perimap_ToolDistance& tool) {

@@ -92,6 +92,7 @@ ShownMesh supported(const client::PredictedMesh& predicted) {
 void SurfaceGate::forget() {
   model_.reset();
   mesh_.reset();
+  tools_.forget();
 }
 
 void SurfaceGate::show_mesh(const perimap_Surface& surface, Instant receipt, ShownSurface& shown) {
@@ -118,6 +119,7 @@ ShownSurface SurfaceGate::show(const perimap_Surface& surface, Instant receipt) 
   } else {
     shown.state = perimap_SURFACE_INVALID;  // also one that this program does not know
   }
+  shown.tools = tools_.at(shown.valid, receipt, shown.usable());
   if (shown.state != perimap_SURFACE_GOOD) {
     shown.why = client::describe(shown.reason);
     shown.remedy = remedy_of(shown.reason);

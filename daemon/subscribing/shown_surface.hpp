@@ -14,6 +14,7 @@
 
 #include "core/geometry/pose.hpp"
 #include "core/time/instant.hpp"
+#include "daemon/subscribing/shown_tools.hpp"
 #include "drivers/recording/cdr.hpp"
 
 namespace perimap {
@@ -51,19 +52,21 @@ struct ShownSurface {
   std::optional<Pose> X_WC;  // at capture; none where the pose of the camera is not known
   std::vector<ShownFeature> features;
   ShownMesh mesh;
+  std::vector<ShownTool> tools;  // beside an unusable surface named alone
 
   [[nodiscard]] bool usable() const noexcept {
     return state == perimap_SURFACE_GOOD || state == perimap_SURFACE_DEGRADED;
   }
 };
 
-// The one gate that surfaces leave through for programs of others: keeps the newest model and mesh of one source, and
-// makes of each surface what may be shown of it. One thread.
+// The one gate that surfaces leave through for programs of others: keeps the newest model, mesh and tools of one
+// source, and makes of each surface what may be shown of it. One thread.
 class SurfaceGate {
  public:
   void take(Sample<perimap_SurfaceModel> model) { model_.emplace(std::move(model)); }
   void take(Sample<perimap_SurfaceMesh> mesh) { mesh_.emplace(std::move(mesh)); }
-  // Another publisher, or another instant of a recording: both are to come anew.
+  void take(const perimap_ToolDistance& tool) { tools_.take(tool); }
+  // Another publisher, or another instant of a recording: all are to come anew.
   void forget();
   // Null: none has come.
   [[nodiscard]] const perimap_SurfaceModel* model() const noexcept { return model_ ? &**model_ : nullptr; }
@@ -78,6 +81,7 @@ class SurfaceGate {
 
   std::optional<Sample<perimap_SurfaceModel>> model_;
   std::optional<Sample<perimap_SurfaceMesh>> mesh_;
+  ShownTools tools_;
   client::PredictedMesh predicted_;
 };
 

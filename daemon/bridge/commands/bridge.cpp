@@ -114,7 +114,8 @@ Outcome bridge_ros2(const BridgeOptions& options, const Console& console) {
   const auto bridge = Ros2Bridge::create({options.domain, options.security}, *domain,
                                          [&console](const std::string& what) { console.complain(what); });
   if (!bridge) return refuse(bridge.error());
-  print_endpoint(fmt::format("ROS 2 domain {}: /perimap/points, /perimap/mesh, /tf, /diagnostics", *domain));
+  print_endpoint(
+      fmt::format("ROS 2 domain {}: /perimap/points, /perimap/mesh, /perimap/tools, /tf, /diagnostics", *domain));
   if (const auto ran = (*bridge)->run(stop->descriptor()); !ran) return refuse(ran.error());
   return {};
 }

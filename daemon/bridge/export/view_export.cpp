@@ -115,6 +115,8 @@ class Exporter {
       if (auto model = reader.decode<perimap_SurfaceModel>(message)) gate_.take(std::move(*model));
     } else if (message.channel == channels::kSurfaceMesh) {
       if (auto mesh = reader.decode<perimap_SurfaceMesh>(message)) gate_.take(std::move(*mesh));
+    } else if (message.channel == channels::kTool) {
+      if (const auto tool = reader.decode<perimap_ToolDistance>(message)) gate_.take(**tool);
     } else if (message.channel == channels::kEcgSamples) {
       if (const auto block = reader.decode<perimap_EcgSamples>(message)) use_ecg(**block, offset);
     } else if (message.channel == channels::kTrackerPose) {

@@ -47,7 +47,13 @@ Expected<void> IgtlBridge::run(int stop_descriptor) {
 }
 
 IgtlBridge::Told IgtlBridge::told_of(const ShownSurface& surface) {
-  Told told{pack_surface(surface), std::nullopt, surface_state_of(surface), camera_state_of(surface), {}};
+  Told told;
+  told.surface = pack_surface(surface);
+  told.tools = pack_tools(surface);
+  told.tool_words = pack_tool_words(surface);
+  told.has_tools = !surface.tools.empty();
+  told.surface_state = surface_state_of(surface);
+  told.camera_state = camera_state_of(surface);
   if (surface.X_WC) told.camera = pack_camera(surface);
   told.until = shown_until(surface, MonotonicClock::now());
   return told;
@@ -64,8 +70,16 @@ void IgtlBridge::tell(const Told& told) {
   } else {
     server_.forget(Subject::kCamera);
   }
+  tell_tools(told.tools, told.tool_words, told.has_tools);
   tell_states(told.surface_state, told.camera_state);
   server_.at(told.until, [this] { silent(); });
+}
+
+void IgtlBridge::tell_tools(const IgtlOutgoing& tips, const IgtlOutgoing& words, bool any) {
+  had_tools_ = had_tools_ || any;
+  if (!had_tools_) return;
+  server_.send(tips);
+  server_.send(words);
 }
 
 void IgtlBridge::tell_states(const IgtlState& surface, const IgtlState& camera) {
@@ -78,6 +92,7 @@ void IgtlBridge::tell_states(const IgtlState& surface, const IgtlState& camera) 
 void IgtlBridge::clear(const IgtlState& why) {
   server_.send(pack_no_surface());
   server_.forget(Subject::kCamera);
+  tell_tools(pack_tools({}), pack_tool_words({}), false);
   tell_states(why, {why.code == Code::kShutDown ? why.code : Code::kNotFound, 0, "unknown", why.words});
 }
 

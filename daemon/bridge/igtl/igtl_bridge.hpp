@@ -37,11 +37,14 @@ class IgtlBridge {
   struct Told {
     IgtlOutgoing surface;
     std::optional<IgtlOutgoing> camera;
+    IgtlOutgoing tools, tool_words;
+    bool has_tools = false;
     IgtlState surface_state, camera_state;
     Instant until;  // after that it may not be shown
   };
   [[nodiscard]] static Told told_of(const ShownSurface& surface);
   void tell(const Told& told);
+  void tell_tools(const IgtlOutgoing& tips, const IgtlOutgoing& words, bool any);
   void tell_states(const IgtlState& surface, const IgtlState& camera);
   void clear(const IgtlState& why);
   void nobody();
@@ -52,6 +55,7 @@ class IgtlBridge {
   const Say say_;
   std::optional<IgtlState> surface_state_, camera_state_;  // as sent last
   bool heard_ = false;                                     // a surface, ever
+  bool had_tools_ = false;                                 // ever: who has none is told nothing of any
   bool silent_ = false;
   bool failed_ = false;
   std::unique_ptr<SurfaceSubscriber> subscriber_;  // last: its thread uses the others

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <igtlPolyDataMessage.h>
 #include <igtlStatusMessage.h>
+#include <igtlStringMessage.h>
 #include <igtlTimeStamp.h>
 #include <igtlTransformMessage.h>
 
@@ -11,6 +12,7 @@
 #include <vector>
 
 #include "daemon/publishing/advice.hpp"
+#include "daemon/publishing/tool_text.hpp"
 #include "daemon/publishing/wire_names.hpp"
 #include "daemon/subscribing/any_time.hpp"
 
@@ -96,9 +98,9 @@ class SurfaceMessage : public igtl::PolyDataMessage {
 };
 
 // All of its arrays are there, be they empty: clients of the library ask for each.
-SurfaceMessage::Pointer empty_surface() {
+SurfaceMessage::Pointer empty_surface(const char* device) {
   auto message = SurfaceMessage::New();
-  message->SetDeviceName(igtl_names::kSurface);
+  message->SetDeviceName(device);
   message->SetPoints(igtl::PolyDataPointArray::New());
   message->SetVertices(igtl::PolyDataCellArray::New());
   message->SetLines(igtl::PolyDataCellArray::New());
@@ -131,7 +133,7 @@ IgtlState camera_state_of(const ShownSurface& surface) {
 }
 
 IgtlOutgoing pack_surface(const ShownSurface& surface) {
-  const auto message = empty_surface();
+  const auto message = empty_surface(igtl_names::kSurface);
   stamp(*message, surface.valid, surface);
   if (!surface.mesh.triangles.empty()) {
     add_mesh(surface.mesh, *message);
@@ -142,7 +144,7 @@ IgtlOutgoing pack_surface(const ShownSurface& surface) {
 }
 
 IgtlOutgoing pack_no_surface() {
-  const auto message = empty_surface();
+  const auto message = empty_surface(igtl_names::kSurface);
   stamp(*message, Instant(), {});
   return packed(Subject::kSurface, *message);
 }
@@ -159,6 +161,45 @@ IgtlOutgoing pack_camera(const ShownSurface& surface) {
   }
   message->SetMatrix(matrix);
   return packed(Subject::kCamera, *message);
+}
+
+IgtlOutgoing pack_tools(const ShownSurface& surface) {
+  const auto message = empty_surface(igtl_names::kTools);
+  stamp(*message, surface.valid, surface);
+  std::vector<std::array<double, 3>> tips;
+  std::vector<float> lines, distances, deviations, touches;
+  for (std::size_t line = 0; line < surface.tools.size(); ++line) {
+    const client::ToolAtInstant& at = surface.tools[line].at;
+    if (!at.tip_known) continue;
+    auto vertex = static_cast<igtlUint32>(tips.size());
+    message->GetVertices()->AddCell(1, &vertex);
+    tips.push_back(at.tip_W_mm);
+    lines.push_back(static_cast<float>(line));
+    distances.push_back(static_cast<float>(at.distance_mm));
+    deviations.push_back(static_cast<float>(at.deviation_mm));
+    touches.push_back(at.touches ? 1.0F : 0.0F);
+  }
+  if (!tips.empty()) {
+    add_points(tips, *message->GetPoints());
+    add_scalars("line", std::move(lines), *message);
+    add_scalars("distance_mm", std::move(distances), *message);
+    add_scalars("deviation_mm", std::move(deviations), *message);
+    add_scalars("touches", std::move(touches), *message);
+  }
+  return packed(Subject::kTools, *message);
+}
+
+IgtlOutgoing pack_tool_words(const ShownSurface& surface) {
+  const auto message = igtl::StringMessage::New();
+  message->SetDeviceName(igtl_names::kTools);
+  stamp(*message, surface.valid, surface);
+  std::string words;
+  for (const ShownTool& tool : surface.tools) {
+    if (!words.empty()) words += '\n';
+    words += tool_words(tool.name, tool.at);
+  }
+  message->SetString(words);
+  return packed(Subject::kToolWords, *message);
 }
 
 IgtlOutgoing pack_state(IgtlOutgoing::Subject subject, const IgtlState& state) {

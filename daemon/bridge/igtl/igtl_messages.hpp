@@ -14,17 +14,18 @@ namespace perimap {
 namespace igtl_names {
 inline constexpr const char* kSurface = "PerimapSurface";  // POLYDATA and its STATUS
 inline constexpr const char* kCamera = "PerimapCamera";    // TRANSFORM and its STATUS
+inline constexpr const char* kTools = "PerimapTools";      // POLYDATA and STRING
 }  // namespace igtl_names
 
 // One whole message. Those of one subject are in its order; of a stream the newest alone is of interest.
 struct IgtlOutgoing {
-  enum class Subject : std::uint8_t { kSurface, kCamera, kSurfaceStatus, kCameraStatus };
-  static constexpr std::size_t kSubjects = 4;
+  enum class Subject : std::uint8_t { kSurface, kCamera, kTools, kToolWords, kSurfaceStatus, kCameraStatus };
+  static constexpr std::size_t kSubjects = 6;
 
   Subject subject = Subject::kSurface;
   std::shared_ptr<const std::string> bytes;
 
-  [[nodiscard]] bool stream() const noexcept { return subject == Subject::kSurface || subject == Subject::kCamera; }
+  [[nodiscard]] bool stream() const noexcept { return subject < Subject::kSurfaceStatus; }
 };
 
 // STATUS of a subject, by the code numbers of the protocol.
@@ -61,6 +62,13 @@ struct IgtlState {
 [[nodiscard]] IgtlOutgoing pack_no_surface();
 // TRANSFORM X_WC, mm, stamped with the UTC of the capture. The surface's X_WC must be there.
 [[nodiscard]] IgtlOutgoing pack_camera(const ShownSurface& surface);
+// POLYDATA: the tip of each tracked tool that is known as a vertex, in mm of W, stamped as the surface. The points'
+// scalars: "line", that of the tool in pack_tool_words(), from 0 on; "distance_mm" from the surface and "deviation_mm",
+// not a number where nobody knows; "touches", 0 or 1. Empty where nothing may be shown: an empty POINT is none to
+// libopenigtlink, and would clear nothing.
+[[nodiscard]] IgtlOutgoing pack_tools(const ShownSurface& surface);
+// STRING: a line for each tool, how far it is from the surface, or why nobody knows.
+[[nodiscard]] IgtlOutgoing pack_tool_words(const ShownSurface& surface);
 // `subject`: kSurfaceStatus or kCameraStatus.
 [[nodiscard]] IgtlOutgoing pack_state(IgtlOutgoing::Subject subject, const IgtlState& state);
 

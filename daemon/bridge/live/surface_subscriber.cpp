@@ -21,7 +21,7 @@ constexpr Duration kForgotten = std::chrono::minutes(1);
 }  // namespace
 
 Expected<std::unique_ptr<SurfaceSubscriber>> SurfaceSubscriber::create(const dds::Membership& membership, Calls calls) {
-  auto readers = SampleReaders::create(membership, true);
+  auto readers = SampleReaders::create(membership, true, true);
   if (!readers) return tl::unexpected(readers.error());
   return std::unique_ptr<SurfaceSubscriber>(new SurfaceSubscriber(std::move(*readers), std::move(calls)));
 }
@@ -59,9 +59,10 @@ void SurfaceSubscriber::receive() {
     keep(sample, writer, receipt);
   };
   while (readers_.wait_set.wait()) {
-    // Models and meshes first: a surface is shown with the newest.
+    // Models, meshes and tools first: a surface is shown with the newest.
     take(readers_.models, use);
     take(readers_.meshes, use);
+    if (readers_.tools) take(*readers_.tools, use);
     take(readers_.phases, use);
     take(readers_.statuses, use);
     take(readers_.surfaces, [this](const perimap_Surface& surface, dds_instance_handle_t writer, Instant receipt,
@@ -96,6 +97,8 @@ void SurfaceSubscriber::keep(const T& sample, dds_instance_handle_t writer, Inst
   if (watch_.hear(sample, writer, to_ns(receipt)) != Hearing::kUse) return;
   if constexpr (std::is_same_v<T, perimap_SurfaceModel> || std::is_same_v<T, perimap_SurfaceMesh>) {
     if (auto copy = owned_copy_of(sample)) gate_.take(std::move(*copy));
+  } else if constexpr (std::is_same_v<T, perimap_ToolDistance>) {
+    gate_.take(sample);
   }
 }
 

@@ -9,6 +9,9 @@ constexpr foxglove_Color kGreen{0.20, 0.80, 0.45, 1.0};
 constexpr foxglove_Color kYellow{1.00, 0.85, 0.20, 1.0};
 constexpr foxglove_Color kRed{0.90, 0.15, 0.30, 1.0};
 
+constexpr foxglove_Color kPink{1.00, 0.45, 0.80, 1.0};
+constexpr foxglove_Color kTouched{1.00, 1.00, 1.00, 1.0};
+
 constexpr double kMostOpaque = 0.9;
 constexpr double kLeastOpaque = 0.2;
 constexpr double kLess_per_mm = 0.35;
@@ -31,5 +34,7 @@ foxglove_Color colour_of(perimap_FeatureState state) noexcept {
       return kRed;
   }
 }
+
+foxglove_Color colour_of_tool(bool touches) noexcept { return touches ? kTouched : kPink; }
 
 }  // namespace perimap

@@ -11,4 +11,7 @@ namespace perimap {
 // Of a feature: converged green, converging yellow, inconsistent red.
 [[nodiscard]] foxglove_Color colour_of(perimap_FeatureState state) noexcept;
 
+// Of a tracked tool's tip: pink; white where it touches.
+[[nodiscard]] foxglove_Color colour_of_tool(bool touches) noexcept;
+
 }  // namespace perimap

@@ -7,6 +7,7 @@
 #include "daemon/bridge/messages/view_colours.hpp"
 #include "daemon/bridge/messages/view_names.hpp"
 #include "daemon/bridge/messages/view_units.hpp"
+#include "daemon/publishing/tool_text.hpp"
 #include "daemon/subscribing/any_time.hpp"
 #include "drivers/recording/foxglove_image.hpp"
 
@@ -15,6 +16,8 @@ namespace {
 
 constexpr std::int64_t kLongest_ns = 10'000'000'000;  // whatever a surface says of itself
 constexpr double kSphere_mm = 1.5;
+constexpr double kTip_mm = 3.0;
+constexpr double kToolText_px = 16.0;
 constexpr double kFrustumDepth_mm = 25.0;
 constexpr double kFrustumLine_px = 1.5;
 constexpr foxglove_Color kFrustumColour{0.6, 0.7, 0.9, 1.0};
@@ -61,6 +64,37 @@ void ViewScene::add_features(const ShownSurface& surface) {
   }
 }
 
+// A tip without a distance is drawn too: its words say why there is none.
+void ViewScene::add_tools(const ShownSurface& surface) {
+  constexpr double kDiameter = kTip_mm * kMetresPerMillimetre;
+  for (const ShownTool& tool : surface.tools) {
+    if (!tool.at.tip_known) continue;
+    const foxglove_Point3 tip = metres(tool.at.tip_W_mm);
+    const foxglove_Color colour = colour_of_tool(tool.at.touches);
+    auto& sphere = tips_.emplace_back();
+    sphere.pose = no_pose();
+    sphere.pose.position = {tip.x, tip.y, tip.z};
+    sphere.size = {kDiameter, kDiameter, kDiameter};
+    sphere.color = colour;
+    tool_words_.push_back(tool_words(tool.name, tool.at));
+    auto& text = tool_texts_.emplace_back();
+    text.pose = sphere.pose;
+    text.billboard = text.scale_invariant = true;
+    text.font_size = kToolText_px;
+    text.color = colour;
+    if (tool.nearest_W_mm) ways_.insert(ways_.end(), {tip, metres(*tool.nearest_W_mm)});
+  }
+  for (std::size_t i = 0; i < tool_texts_.size(); ++i) tool_texts_[i].text = lent(tool_words_[i]);
+  if (ways_.empty()) return;
+  auto& line = tool_lines_.emplace_back();
+  line.type = foxglove_LINE_LIST;
+  line.pose = no_pose();
+  line.thickness = kFrustumLine_px;
+  line.scale_invariant = true;
+  line.color = colour_of_tool(false);
+  lend(ways_, line.points);
+}
+
 // From the camera through the corners of its picture.
 void ViewScene::add_frustum(const CameraModel& lens) {
   const auto corner = [&lens](double u, double v) {
@@ -93,6 +127,11 @@ const foxglove_SceneUpdate& ViewScene::of(const ShownSurface& surface, Instant u
   indices_.clear();
   triangles_.clear();
   spheres_.clear();
+  tips_.clear();
+  ways_.clear();
+  tool_lines_.clear();
+  tool_words_.clear();
+  tool_texts_.clear();
   edges_.clear();
   lines_.clear();
   if (!surface.usable()) {
@@ -109,6 +148,13 @@ const foxglove_SceneUpdate& ViewScene::of(const ShownSurface& surface, Instant u
   auto& features = entities_.emplace_back(entity("features", utc, world_frame, surface));
   add_features(surface);
   lend(spheres_, features.spheres);
+  if (!surface.tools.empty()) {
+    auto& tools = entities_.emplace_back(entity("tools", utc, world_frame, surface));
+    add_tools(surface);
+    lend(tips_, tools.spheres);
+    lend(tool_lines_, tools.lines);
+    lend(tool_texts_, tools.texts);
+  }
   if (surface.X_WC && lens) {
     auto& frustum = entities_.emplace_back(entity("camera", utc, camera_frame, surface));
     frustum.frame_locked = true;

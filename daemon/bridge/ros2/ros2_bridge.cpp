@@ -38,15 +38,17 @@ Expected<std::unique_ptr<Ros2Bridge>> Ros2Bridge::create(const dds::Membership& 
   };
   auto points = writer(ros2_topics::kPoints, sensor_msgs_msg_dds__PointCloud2__desc);
   auto mesh = writer(ros2_topics::kMesh, visualization_msgs_msg_dds__Marker__desc);
+  auto tools = writer(ros2_topics::kTools, visualization_msgs_msg_dds__Marker__desc);
   auto transforms = writer(ros2_topics::kTransforms, tf2_msgs_msg_dds__TFMessage__desc);
   auto diagnostics = writer(ros2_topics::kDiagnostics, diagnostic_msgs_msg_dds__DiagnosticArray__desc);
-  for (const auto* made : {&points, &mesh, &transforms, &diagnostics}) {
+  for (const auto* made : {&points, &mesh, &tools, &transforms, &diagnostics}) {
     if (!*made) return tl::unexpected(made->error());
   }
-  std::unique_ptr<Ros2Bridge> bridge(new Ros2Bridge(
-      membership.domain,
-      {std::move(*participant), std::move(*points), std::move(*mesh), std::move(*transforms), std::move(*diagnostics)},
-      std::move(say)));
+  std::unique_ptr<Ros2Bridge> bridge(
+      new Ros2Bridge(membership.domain,
+                     {std::move(*participant), std::move(*points), std::move(*mesh), std::move(*tools),
+                      std::move(*transforms), std::move(*diagnostics)},
+                     std::move(say)));
   Ros2Bridge* self = bridge.get();
   auto subscriber = SurfaceSubscriber::create(membership, {[self](const ShownSurface& surface) {
                                                              const std::lock_guard lock(self->mutex_);
@@ -90,6 +92,7 @@ void Ros2Bridge::tell(const ShownSurface& surface) {
   if (std::exchange(silent_, false)) say_("surfaces come again");
   write(writers_.points, &messages_.points(surface, now_utc), ros2_topics::kPoints);
   write(writers_.mesh, &messages_.mesh(surface, now_utc), ros2_topics::kMesh);
+  write(writers_.tools, &messages_.tools(surface, now_utc), ros2_topics::kTools);
   // Several surfaces may rest on one frame; tf takes an instant once.
   if (surface.X_WC && surface.capture != transformed_) {
     transformed_ = surface.capture;
@@ -112,6 +115,7 @@ void Ros2Bridge::clear(Ros2Level level, std::string_view words) {
   const Instant now_utc = utc_now();
   write(writers_.points, &messages_.points(nothing_, now_utc), ros2_topics::kPoints);
   write(writers_.mesh, &messages_.mesh(nothing_, now_utc), ros2_topics::kMesh);
+  write(writers_.tools, &messages_.tools(nothing_, now_utc), ros2_topics::kTools);
   diagnose(nothing_, level, std::string(words));
 }
 

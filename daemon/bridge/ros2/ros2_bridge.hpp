@@ -18,8 +18,8 @@
 namespace perimap {
 
 // ROS 2 without ROS: its messages on its topics, by a participant of our own in its domain. A surface is there for as
-// long as it may be used: an invalid one, one whose valid_until has passed and none at all leave no point and no mesh,
-// and diagnostics that say why.
+// long as it may be used: an invalid one, one whose valid_until has passed and none at all leave no point, no mesh and
+// no tool, and diagnostics that say why.
 class Ros2Bridge {
  public:
   // For a person at the terminal; any thread.
@@ -38,7 +38,7 @@ class Ros2Bridge {
  private:
   struct Writers {
     dds::Participant participant;
-    dds::UntypedWriter points, mesh, transforms, diagnostics;
+    dds::UntypedWriter points, mesh, tools, transforms, diagnostics;
   };
 
   Ros2Bridge(int domain, Writers writers, Say say)

@@ -11,6 +11,7 @@
 #include "daemon/bridge/messages/lent.hpp"
 #include "daemon/bridge/messages/view_colours.hpp"
 #include "daemon/bridge/messages/view_units.hpp"
+#include "daemon/publishing/tool_text.hpp"
 #include "daemon/publishing/wire_names.hpp"
 #include "daemon/subscribing/any_time.hpp"
 
@@ -24,6 +25,7 @@ constexpr std::uint8_t kUint8 = 2;
 constexpr std::uint8_t kUint32 = 6;
 constexpr std::uint8_t kFloat32 = 7;
 // visualization_msgs/Marker.
+constexpr std::int32_t kSpheres = 7;  // SPHERE_LIST
 constexpr std::int32_t kTriangles = 11;
 constexpr std::int32_t kAdd = 0;
 constexpr std::int32_t kTakeAllAway = 3;
@@ -49,6 +51,10 @@ builtin_interfaces_msg_dds__Time_ stamp_of(Instant utc) {
 geometry_msgs_msg_dds__Point_ in_metres(const std::array<double, 3>& p_mm) {
   const foxglove_Point3 p = metres(p_mm);
   return {p.x, p.y, p.z};
+}
+
+std_msgs_msg_dds__ColorRGBA_ to_ros2(const foxglove_Color& c) {
+  return {static_cast<float>(c.r), static_cast<float>(c.g), static_cast<float>(c.b), static_cast<float>(c.a)};
 }
 
 }  // namespace
@@ -95,35 +101,55 @@ const Ros2Points& Ros2Messages::points(const ShownSurface& surface, Instant now_
   return points_;
 }
 
-const Ros2Marker& Ros2Messages::mesh(const ShownSurface& surface, Instant now_utc) {
-  marker_ = {};
-  corners_.clear();
-  colours_.clear();
-  marker_.header = header(surface, surface.valid, now_utc);
-  marker_.ns = lent("perimap");
-  marker_.type = kTriangles;
-  marker_.action = surface.mesh.triangles.empty() ? kTakeAllAway : kAdd;
-  marker_.pose.orientation.w = 1.0;
-  marker_.scale = {1.0, 1.0, 1.0};
-  const auto colour = [&surface](double deviation_mm) {
-    const foxglove_Color c = colour_of(surface.state, deviation_mm);
-    return std_msgs_msg_dds__ColorRGBA_{static_cast<float>(c.r), static_cast<float>(c.g), static_cast<float>(c.b),
-                                        static_cast<float>(c.a)};
-  };
-  marker_.color = colour(0.0);
+Ros2Marker Ros2Messages::marker(const ShownSurface& surface, Instant now_utc) {
+  Ros2Marker marker{};
+  marker.header = header(surface, surface.valid, now_utc);
+  marker.ns = lent("perimap");
+  marker.action = kTakeAllAway;
+  marker.pose.orientation.w = 1.0;
+  marker.scale = {1.0, 1.0, 1.0};
   const std::int64_t lifetime_ns =
       std::clamp<std::int64_t>(wrapped_difference(to_ns(surface.valid_until), to_ns(surface.valid)), 1, kLongest_ns);
-  marker_.lifetime = {static_cast<std::int32_t>(lifetime_ns / kSecond_ns),
-                      static_cast<std::uint32_t>(lifetime_ns % kSecond_ns)};
+  marker.lifetime = {static_cast<std::int32_t>(lifetime_ns / kSecond_ns),
+                     static_cast<std::uint32_t>(lifetime_ns % kSecond_ns)};
+  return marker;
+}
+
+const Ros2Marker& Ros2Messages::mesh(const ShownSurface& surface, Instant now_utc) {
+  marker_ = marker(surface, now_utc);
+  corners_.clear();
+  colours_.clear();
+  marker_.type = kTriangles;
+  if (!surface.mesh.triangles.empty()) marker_.action = kAdd;
+  marker_.color = to_ros2(colour_of(surface.state, 0.0));
   for (const auto& triangle : surface.mesh.triangles) {
     for (const std::uint32_t vertex : triangle) {
       corners_.push_back(in_metres(surface.mesh.positions_W_mm[vertex]));
-      colours_.push_back(colour(surface.mesh.deviations_mm[vertex]));
+      colours_.push_back(to_ros2(colour_of(surface.state, surface.mesh.deviations_mm[vertex])));
     }
   }
   lend(corners_, marker_.points);
   lend(colours_, marker_.colors);
   return marker_;
+}
+
+const Ros2Marker& Ros2Messages::tools(const ShownSurface& surface, Instant now_utc) {
+  tools_ = marker(surface, now_utc);
+  tips_.clear();
+  tip_colours_.clear();
+  tools_.type = kSpheres;
+  constexpr double kDiameter_m = 0.003;
+  tools_.scale = {kDiameter_m, kDiameter_m, kDiameter_m};
+  for (const ShownTool& tool : surface.tools) {
+    if (!tool.at.tip_known) continue;
+    tips_.push_back(in_metres(tool.at.tip_W_mm));
+    tip_colours_.push_back(to_ros2(colour_of_tool(tool.at.touches)));
+  }
+  if (!tips_.empty()) tools_.action = kAdd;
+  tools_.color = to_ros2(colour_of_tool(false));
+  lend(tips_, tools_.points);
+  lend(tip_colours_, tools_.colors);
+  return tools_;
 }
 
 const Ros2Transforms& Ros2Messages::transforms(const ShownSurface& surface, Instant now_utc) {
@@ -133,6 +159,26 @@ const Ros2Transforms& Ros2Messages::transforms(const ShownSurface& surface, Inst
       header(surface, surface.capture, now_utc), lent(names_.child), {{t.x, t.y, t.z}, {q.x(), q.y(), q.z(), q.w()}}};
   transforms_.transforms = {1, 1, camera_.data(), false};
   return transforms_;
+}
+
+void Ros2Messages::add_tool_statuses(const ShownSurface& surface) {
+  tool_texts_.clear();
+  for (const ShownTool& tool : surface.tools) {
+    tool_texts_.push_back(fmt::format("perimap: tool {}", tool.name));
+    tool_texts_.push_back(tool_words(tool.name, tool.at));
+  }
+  for (std::size_t i = 0; i < surface.tools.size(); ++i) {
+    const std::uint8_t state = surface.tools[i].at.state;
+    const Ros2Level level = state == perimap_TOOL_GOOD       ? Ros2Level::kOk
+                            : state == perimap_TOOL_DEGRADED ? Ros2Level::kWarning
+                                                             : Ros2Level::kError;
+    diagnostic_msgs_msg_dds__DiagnosticStatus_ status{};
+    status.level = static_cast<std::uint8_t>(level);
+    status.name = lent(tool_texts_[2 * i]);
+    status.message = lent(tool_texts_[2 * i + 1]);
+    status.hardware_id = lent(texts_[1]);
+    statuses_.push_back(status);
+  }
 }
 
 const Ros2Diagnostics& Ros2Messages::diagnostics(const ShownSurface& surface, Ros2Level level, std::string_view words,
@@ -151,13 +197,15 @@ const Ros2Diagnostics& Ros2Messages::diagnostics(const ShownSurface& surface, Ro
   const char* const keys[] = {"state", "reason", "remedy", "features", "converged", "no mesh because"};
   values_.clear();
   for (std::size_t i = 0; i < std::size(keys); ++i) values_.push_back({lent(keys[i]), lent(texts_[i + 2])});
-  status_[0] = {};
-  status_[0].level = static_cast<std::uint8_t>(level);
-  status_[0].name = lent("perimap: surface");
-  status_[0].message = lent(texts_[0]);
-  status_[0].hardware_id = lent(texts_[1]);
-  lend(values_, status_[0].values);
-  diagnostics_.status = {1, 1, status_.data(), false};
+  diagnostic_msgs_msg_dds__DiagnosticStatus_ status{};
+  status.level = static_cast<std::uint8_t>(level);
+  status.name = lent("perimap: surface");
+  status.message = lent(texts_[0]);
+  status.hardware_id = lent(texts_[1]);
+  lend(values_, status.values);
+  statuses_.assign(1, status);
+  add_tool_statuses(surface);
+  lend(statuses_, diagnostics_.status);
   return diagnostics_;
 }
 

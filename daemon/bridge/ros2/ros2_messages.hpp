@@ -27,9 +27,12 @@ class Ros2Messages {
   // The mesh as a list of triangles that goes by itself when the surface's valid_until has passed; where there is
   // none, it takes the one before away.
   [[nodiscard]] const Ros2Marker& mesh(const ShownSurface& surface, Instant now_utc);
+  // The tips of tracked tools as spheres, likewise.
+  [[nodiscard]] const Ros2Marker& tools(const ShownSurface& surface, Instant now_utc);
   // From the world frame to the camera's. The surface must have X_WC.
   [[nodiscard]] const Ros2Transforms& transforms(const ShownSurface& surface, Instant now_utc);
-  // What may be trusted, and why not. `level` and `words` tell more than the surface where it does not come any more.
+  // What may be trusted, and why not, and how far each tracked tool is. `level` and `words` tell more than the surface
+  // where it does not come any more.
   [[nodiscard]] const Ros2Diagnostics& diagnostics(const ShownSurface& surface, Ros2Level level, std::string_view words,
                                                    Instant now_utc);
 
@@ -38,6 +41,9 @@ class Ros2Messages {
     std::string frame;
     std::string child = kRos2CameraFrame;
   };
+  // Without points: what takes away what was shown.
+  Ros2Marker marker(const ShownSurface& surface, Instant now_utc);
+  void add_tool_statuses(const ShownSurface& surface);
   Ros2Header header(const ShownSurface& surface, Instant on_publishers_clock, Instant now_utc);
 
   Names names_;
@@ -47,12 +53,16 @@ class Ros2Messages {
   Ros2Marker marker_{};
   std::vector<geometry_msgs_msg_dds__Point_> corners_;
   std::vector<std_msgs_msg_dds__ColorRGBA_> colours_;
+  Ros2Marker tools_{};
+  std::vector<geometry_msgs_msg_dds__Point_> tips_;
+  std::vector<std_msgs_msg_dds__ColorRGBA_> tip_colours_;
   Ros2Transforms transforms_{};
   std::array<geometry_msgs_msg_dds__TransformStamped_, 1> camera_{};
   Ros2Diagnostics diagnostics_{};
-  std::array<diagnostic_msgs_msg_dds__DiagnosticStatus_, 1> status_{};
+  std::vector<diagnostic_msgs_msg_dds__DiagnosticStatus_> statuses_;
   std::vector<diagnostic_msgs_msg_dds__KeyValue_> values_;
   std::vector<std::string> texts_;
+  std::vector<std::string> tool_texts_;  // of each its name and its words
 };
 
 // ok, warning or error: good, degraded or neither.

@@ -18,6 +18,7 @@ namespace ros2_topics {
 // ROS 2 puts rt/ before the names of its topics.
 inline constexpr const char* kPoints = "rt/perimap/points";
 inline constexpr const char* kMesh = "rt/perimap/mesh";
+inline constexpr const char* kTools = "rt/perimap/tools";
 inline constexpr const char* kTransforms = "rt/tf";
 inline constexpr const char* kDiagnostics = "rt/diagnostics";
 

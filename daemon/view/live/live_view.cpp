@@ -42,7 +42,7 @@ const T* next_of_writer(const dds::Loan<T>& loan, std::size_t i) {
 }  // namespace
 
 Expected<std::unique_ptr<LiveView>> LiveView::create(const dds::Membership& membership, WebServer& server, Say say) {
-  auto readers = SampleReaders::create(membership, true);
+  auto readers = SampleReaders::create(membership, true, true);
   if (!readers) return tl::unexpected(readers.error());
   std::optional<GuidanceReader> guidance;
   if (auto reader = GuidanceReader::create(readers->participant)) {
@@ -99,13 +99,18 @@ void LiveView::hear(dds::Reader<T>& reader, Use use) {
 void LiveView::receive() {
   pthread_setname_np(pthread_self(), "view");
   while (readers_.wait_set.wait()) {
-    // Models and meshes first: a surface is told with the newest.
+    // Models, meshes and tools first: a surface is told with the newest.
     hear(readers_.models, [this](const perimap_SurfaceModel& model, std::uint64_t publisher, const auto*) {
       if (auto copy = owned_copy_of(model)) publishers_[publisher].teller.hear(std::move(*copy));
     });
     hear(readers_.meshes, [this](const perimap_SurfaceMesh& mesh, std::uint64_t publisher, const auto*) {
       if (auto copy = owned_copy_of(mesh)) publishers_[publisher].teller.hear(std::move(*copy));
     });
+    if (readers_.tools) {
+      hear(*readers_.tools, [this](const perimap_ToolDistance& tool, std::uint64_t publisher, const auto*) {
+        publishers_[publisher].teller.hear(tool);
+      });
+    }
     const Instant receipt = MonotonicClock::now();
     hear(readers_.surfaces, [&](const perimap_Surface& surface, std::uint64_t publisher, const perimap_Surface* next) {
       publishers_[publisher].heard = receipt;

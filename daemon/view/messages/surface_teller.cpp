@@ -9,6 +9,7 @@
 #include <string>
 
 #include "daemon/publishing/advice.hpp"
+#include "daemon/publishing/tool_text.hpp"
 #include "daemon/publishing/use_text.hpp"
 #include "daemon/publishing/wire_names.hpp"
 #include "daemon/view/messages/milliseconds.hpp"
@@ -82,11 +83,34 @@ Told features_of(const perimap_Surface& surface) {
   return told;
 }
 
+Json place_json(const std::array<double, 3>& place) {
+  return {rounded(place[0]), rounded(place[1]), rounded(place[2])};
+}
+
+Json tools_json(const std::vector<ShownTool>& tools) {
+  Json list = Json::array();
+  for (const ShownTool& tool : tools) {
+    const client::ToolAtInstant& at = tool.at;
+    const bool good = at.refusal == client::ToolRefusal::kNone && at.state == perimap_TOOL_GOOD;
+    list.push_back({{"tool", tool.name},
+                    {"state", tool_state_name(at.state)},
+                    {"why", good ? "" : client::describe(at)},
+                    {"touches", at.touches},
+                    {"distance_mm", rounded(at.distance_mm)},
+                    {"deviation_mm", rounded(at.deviation_mm)},
+                    {"rate_mm_per_s", rounded(at.rate_mm_per_s)},
+                    {"tip_mm", at.tip_known ? place_json(at.tip_W_mm) : Json(nullptr)},
+                    {"nearest_mm", tool.nearest_W_mm ? place_json(*tool.nearest_W_mm) : Json(nullptr)}});
+  }
+  return list;
+}
+
 }  // namespace
 
 void SurfaceTeller::forget() {
   model_.reset();
   mesh_.reset();
+  tools_.forget();
 }
 
 Json SurfaceTeller::mesh_at(const perimap_Surface& surface, Instant receipt) {
@@ -133,6 +157,7 @@ Json SurfaceTeller::tell(const perimap_Surface& surface, Instant receipt) {
                {"valid_for_ms", page_ms(surface.valid_until_ns) - page_ms(to_ns(receipt))},
                {"phase_rad", rounded(surface.cardiac_phase_rad)},
                {"phase_deviation_rad", rounded(surface.cardiac_phase_deviation_rad)}};
+  json["tools"] = tools_json(tools_.at(from_ns(surface.valid_time_ns), receipt, usable));
   if (!usable) return json;
   json["camera"] = camera_json(surface);
   json["features"] = std::move(told.features);

@@ -9,16 +9,19 @@
 #include <perimap_mesh_client.hpp>
 
 #include "core/time/instant.hpp"
+#include "daemon/subscribing/shown_tools.hpp"
 #include "drivers/recording/cdr.hpp"
 
 namespace perimap {
 
-// Keeps the newest model and mesh of one perimapd, and moves the mesh to the instant of each surface. One thread.
+// Keeps the newest model, mesh and tools of one perimapd, and moves the mesh to the instant of each surface. One
+// thread.
 class SurfaceTeller {
  public:
   void hear(Sample<perimap_SurfaceModel> model) { model_.emplace(std::move(model)); }
   void hear(Sample<perimap_SurfaceMesh> mesh) { mesh_.emplace(std::move(mesh)); }
-  // Another instant of a recording: both are to come anew.
+  void hear(const perimap_ToolDistance& tool) { tools_.take(tool); }
+  // Another instant of a recording: all are to come anew.
   void forget();
   // Null: none has come.
   [[nodiscard]] const perimap_SurfaceModel* model() const noexcept { return model_ ? &**model_ : nullptr; }
@@ -34,6 +37,7 @@ class SurfaceTeller {
 
   std::optional<Sample<perimap_SurfaceModel>> model_;
   std::optional<Sample<perimap_SurfaceMesh>> mesh_;
+  ShownTools tools_;
   client::PredictedMesh predicted_;
 };
 

@@ -8,6 +8,7 @@ import {Scene} from "./scene.mjs";
 import {showFacts, showSources} from "./sources.mjs";
 import {Strip} from "./strip.mjs";
 import {Timeline} from "./timeline.mjs";
+import {Tools} from "./tools.mjs";
 import {Held, judge, Lag} from "./trust.mjs";
 
 const $ = (id) => document.getElementById(id);
@@ -21,7 +22,7 @@ addEventListener("resize", measure);
 if (location.search) history.replaceState(null, "", "/");
 
 const scene = new Scene($("scene")), strip = new Strip($("strip")), delays = new Delays($("delays"));
-const picture = new Picture($("picture"));
+const picture = new Picture($("picture")), tools = new Tools($("tools"));
 const guidance = new Guidance({section: document.querySelector("section.guidance"), what: $("guided-what"), line: $("guided-line"),
                                clock: $("guided-clock"), bar: $("guided-bar"), canvas: $("guided-picture")});
 const seen = {};
@@ -151,6 +152,7 @@ function tell() {
   set("known", surface ? `of ${surface.known}` : "");
   const mesh = surface?.mesh?.triangles ? `mesh of ${surface.mesh.triangles.length / 3} triangles` : "";
   set("surface-words", [surface ? seen.source : "", mesh, surface?.mesh?.words].filter(Boolean).join(" \u00b7 "));
+  tools.show(seen.surface?.tools ?? [], judged.state);
   // Drawn by this very program, so that a page that stands still is seen to.
   set("life", connection.link.open ? "\u25d0\u25d3\u25d1\u25d2"[Math.floor(now / 250) % 4] : "\u25cb");
 }

@@ -2,6 +2,7 @@
 // the front (docs/decisions/0089).
 import {clear, font, scaled} from "./canvas.mjs";
 import {drawFeature} from "./marks.mjs";
+import {kToolColour, kTouchColour, toolWords} from "./tools.mjs";
 import {worse} from "./trust.mjs";
 
 export const kMeshColours = {good: [63, 208, 164], degraded: [242, 182, 50]};
@@ -123,6 +124,7 @@ export class Scene {
     this.drawMesh(context, surface.mesh, vertices.map(look), worse(state, surface.mesh?.state ?? "invalid"));
     this.drawFeatures(context, surface.features, features.map(look));
     if (surface.camera) this.drawScope(context, width, height, surface.camera, look);
+    this.drawTools(context, width, height, surface.tools ?? [], look);
     this.drawScaleBar(context, height, look);
   }
 
@@ -200,12 +202,40 @@ export class Scene {
       context.lineTo(base[(i + 1) % 4][0], base[(i + 1) % 4][1]);
     });
     context.stroke();
+    context.fillStyle = "#7cc4ff";
+    this.label(context, width, height, tip[0], tip[1], "scope");
+  }
+
+  // Each tip, and the way from it to the surface.
+  drawTools(context, width, height, tools, look) {
+    for (const tool of tools) {
+      if (!tool.tip_mm) continue;
+      const [x, y] = look(tool.tip_mm), size = scaled(6);
+      context.strokeStyle = context.fillStyle = tool.touches ? kTouchColour : kToolColour;
+      context.lineWidth = 2;
+      if (tool.nearest_mm) {
+        const [nx, ny] = look(tool.nearest_mm);
+        context.beginPath();
+        context.moveTo(x, y);
+        context.lineTo(nx, ny);
+        context.stroke();
+      }
+      context.beginPath();
+      context.moveTo(x - size, y); context.lineTo(x, y - size); context.lineTo(x + size, y); context.lineTo(x, y + size);
+      context.closePath();
+      if (tool.state === "invalid") context.stroke();  // hollow: where it is, and not how far
+      else context.fill();
+      this.label(context, width, height, x, y, toolWords(tool).words);
+    }
+  }
+
+  // Beside a place, inside of the canvas; not of what is far outside.
+  label(context, width, height, x, y, words) {
     context.font = font();
     context.textAlign = "left";
-    context.fillStyle = "#7cc4ff";
-    const label = context.measureText("scope").width, near = scaled(40);
-    if (tip[0] < -near || tip[0] > width + near || tip[1] < -near || tip[1] > height + near) return;
-    context.fillText("scope", clamp(tip[0] + 8, 4, width - label - 4), clamp(tip[1] - 4, scaled(16), height - 6));
+    const length = context.measureText(words).width, near = scaled(40);
+    if (x < -near || x > width + near || y < -near || y > height + near) return;
+    context.fillText(words, clamp(x + 10, 4, Math.max(4, width - length - 4)), clamp(y - 6, scaled(16), height - 6));
   }
 
   drawScaleBar(context, height, look) {

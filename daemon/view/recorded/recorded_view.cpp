@@ -161,6 +161,8 @@ void RecordedView::use(RecordingPlayer& player, const RecordedMessage& message, 
     if (auto model = reader.decode<perimap_SurfaceModel>(message)) teller_.hear(std::move(*model));
   } else if (message.channel == channels::kSurfaceMesh) {
     if (auto mesh = reader.decode<perimap_SurfaceMesh>(message)) teller_.hear(std::move(*mesh));
+  } else if (message.channel == channels::kTool) {
+    if (const auto tool = reader.decode<perimap_ToolDistance>(message)) teller_.hear(**tool);
   } else if (message.channel == channels::kPhase) {
     const auto phase = reader.decode<perimap_Phase>(message);
     if (phase && states_.stream == (*phase)->stream) told.push_back(phase_json(**phase));

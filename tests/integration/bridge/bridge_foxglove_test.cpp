@@ -19,6 +19,7 @@ namespace {
 using namespace std::chrono_literals;
 using test::MadePublication;
 using test::ViewerClient;
+using testing::AnyOf;
 using testing::HasSubstr;
 using testing::StartsWith;
 
@@ -121,8 +122,22 @@ class BridgeFoxglove : public test::BridgeTest {
       EXPECT_EQ(entity.lifetime.nsec, 200'000'000U);
       for (const foxglove_TriangleListPrimitive& mesh : std::span(entity.triangles._buffer, entity.triangles._length))
         hold_mesh(mesh, valid);
-      if (entity.spheres._length > 0) hold_features(std::span(entity.spheres._buffer, entity.spheres._length), valid);
+      if (std::string_view(entity.id) == "tools") {
+        hold_tools(entity);
+      } else if (entity.spheres._length > 0) {
+        hold_features(std::span(entity.spheres._buffer, entity.spheres._length), valid);
+      }
     }
+  }
+  void hold_tools(const foxglove_SceneEntity& entity) {
+    ASSERT_EQ(entity.spheres._length, 1U);
+    EXPECT_NEAR(entity.spheres._buffer[0].pose.position.x, 0.004, 1e-12);
+    ASSERT_EQ(entity.lines._length, 1U);
+    ASSERT_EQ(entity.lines._buffer[0].points._length, 2U);
+    EXPECT_NEAR(entity.lines._buffer[0].points._buffer[1].z, 0.1, 1e-12);
+    ASSERT_EQ(entity.texts._length, 1U);
+    EXPECT_THAT(entity.texts._buffer[0].text, AnyOf(HasSubstr(test::kToolNow), HasSubstr(test::kToolBefore)));
+    ++tools_;
   }
   void hold_mesh(const foxglove_TriangleListPrimitive& mesh, Instant valid) {
     ASSERT_EQ(mesh.points._length, 4U);  // the first vertex is uncertain
@@ -158,11 +173,11 @@ class BridgeFoxglove : public test::BridgeTest {
 
   std::uint16_t port_ = 0;
   std::unique_ptr<ViewerClient> viewer_;
-  std::map<std::uint32_t, std::string> topics_;              // by subscription
-  std::map<std::string, std::string> types_;                 // by topic
-  std::string words_, state_, reason_;                       // the last
-  std::uint32_t features_ = 0;                               // of the last worth
-  int scenes_ = 0, meshes_ = 0, cleared_ = 0, cameras_ = 0;  // so many were held
+  std::map<std::uint32_t, std::string> topics_;                          // by subscription
+  std::map<std::string, std::string> types_;                             // by topic
+  std::string words_, state_, reason_;                                   // the last
+  std::uint32_t features_ = 0;                                           // of the last worth
+  int scenes_ = 0, meshes_ = 0, cleared_ = 0, cameras_ = 0, tools_ = 0;  // so many were held
 };
 
 TEST_F(BridgeFoxglove, WhatIsReceivedIsWhatWasPublishedAndAnInvalidSurfaceClearsIt) {
@@ -171,7 +186,7 @@ TEST_F(BridgeFoxglove, WhatIsReceivedIsWhatWasPublishedAndAnInvalidSurfaceClears
   EXPECT_EQ(scenes_, 0);
 
   perimapd_.open(domain_);
-  ASSERT_TRUE(see([this] { return scenes_ >= 5 && meshes_ >= 5 && cameras_ >= 5; }));
+  ASSERT_TRUE(see([this] { return scenes_ >= 5 && meshes_ >= 5 && cameras_ >= 5 && tools_ >= 5; }));
   EXPECT_EQ(state_, "good");
   EXPECT_EQ(features_, 3U);
   EXPECT_THAT(words_, HasSubstr("may be used"));

@@ -47,7 +47,7 @@ class BridgeIgtl : public test::BridgeTest {
   }
 
   void check(const IgtlReceived& got) {
-    if (got.type == "POLYDATA" && !got.points.empty()) {
+    if (got.type == "POLYDATA" && got.device == "PerimapSurface" && !got.points.empty()) {
       ++surfaces_;
       const auto act = perimapd_.published_for(got.utc_ns);
       ASSERT_TRUE(act) << "nothing was published for " << got.utc_ns;
@@ -56,6 +56,14 @@ class BridgeIgtl : public test::BridgeTest {
       // Sent before its valid_until, and received at once on a machine that has the time.
       EXPECT_LT(MonotonicClock::now(), valid + 200ms + kLoaded);
       got.triangles.empty() ? check_features(got, valid) : check_mesh(got, valid);
+    } else if (got.type == "POLYDATA" && got.device == "PerimapTools" && !got.points.empty()) {
+      ++tips_;
+      const auto act = perimapd_.published_for(got.utc_ns);
+      ASSERT_TRUE(act && act->state != perimap_SURFACE_INVALID) << "of an invalid surface a tip has left";
+      ASSERT_EQ(got.points.size(), 1U);
+      EXPECT_THAT(got.points[0], testing::ElementsAre(4.0F, 5.0F, 97.0F));
+      const float distance = got.scalars.at("distance_mm")[0];
+      EXPECT_TRUE(distance > 2.0F && distance <= 3.0F) << distance;
     } else if (got.type == "TRANSFORM") {
       ++cameras_;
       const auto act = perimapd_.published_for(got.utc_ns + 50'000'000);  // of the capture
@@ -97,13 +105,17 @@ class BridgeIgtl : public test::BridgeTest {
   std::string endpoint_;
   int port_ = 0;
   test::IgtlReceiver client_;
-  int surfaces_ = 0, with_mesh_ = 0, without_mesh_ = 0, cameras_ = 0;
+  int surfaces_ = 0, with_mesh_ = 0, without_mesh_ = 0, cameras_ = 0, tips_ = 0;
 };
 
 TEST_F(BridgeIgtl, WhatIsReceivedIsWhatWasPublishedAndAnInvalidSurfaceClearsIt) {
   start();
-  const auto is_empty = [](const IgtlReceived& got) { return got.type == "POLYDATA" && got.points.empty(); };
-  const auto has_points = [](const IgtlReceived& got) { return got.type == "POLYDATA" && !got.points.empty(); };
+  const auto is_empty = [](const IgtlReceived& got) {
+    return got.device == "PerimapSurface" && got.type == "POLYDATA" && got.points.empty();
+  };
+  const auto has_points = [](const IgtlReceived& got) {
+    return got.device == "PerimapSurface" && got.type == "POLYDATA" && !got.points.empty();
+  };
   ASSERT_TRUE(until(is_empty));
   ASSERT_TRUE(until_state("PerimapSurface", Code::STATUS_NOT_PRESENT));
   ASSERT_TRUE(program_->says("nobody publishes in DDS domain " + std::to_string(domain_)));
@@ -118,6 +130,10 @@ TEST_F(BridgeIgtl, WhatIsReceivedIsWhatWasPublishedAndAnInvalidSurfaceClearsIt) 
   ASSERT_TRUE(until([](const IgtlReceived& got) { return !got.triangles.empty(); }));
   EXPECT_GT(without_mesh_, 10);
   EXPECT_GT(cameras_, 10);
+  EXPECT_GT(tips_, 5);
+  ASSERT_TRUE(until([](const IgtlReceived& got) {
+    return got.type == "STRING" && (got.words == test::kToolNow || got.words.find(test::kToolBefore) == 0);
+  }));
 
   perimapd_.play({perimap_SURFACE_DEGRADED, perimap_SURFACE_REASON_POSE_MISSING, false});
   const auto degraded = until_state("PerimapSurface", Code::STATUS_NOT_READY);
@@ -134,9 +150,13 @@ TEST_F(BridgeIgtl, WhatIsReceivedIsWhatWasPublishedAndAnInvalidSurfaceClearsIt) 
   ASSERT_TRUE(invalid);
   EXPECT_EQ(invalid->name, "invalid");
   EXPECT_THAT(invalid->words, HasSubstr("no heart beat for too long"));
-  const int before = surfaces_;
+  const int before = surfaces_, tips_before = tips_;
   for (int i = 0; i < 10; ++i) ASSERT_TRUE(until(is_empty));
   EXPECT_EQ(surfaces_, before);
+  EXPECT_EQ(tips_, tips_before);
+  ASSERT_TRUE(until([](const IgtlReceived& got) {
+    return got.type == "STRING" && got.words == "instrument/probe: the surface is not good";
+  }));
 
   perimapd_.play({});
   ASSERT_TRUE(until_state("PerimapSurface", Code::STATUS_OK));

@@ -15,6 +15,7 @@ namespace {
 
 using namespace std::chrono_literals;
 using test::MadePublication;
+using testing::AnyOf;
 using testing::ElementsAre;
 using testing::HasSubstr;
 
@@ -115,14 +116,16 @@ class BridgeRos2 : public test::BridgeTest {
 TEST_F(BridgeRos2, WhatIsReceivedIsWhatWasPublishedAndAnInvalidSurfaceClearsIt) {
   RosReader<Ros2Points> points(*ros_, "rt/perimap/points", sensor_msgs_msg_dds__PointCloud2__desc);
   RosReader<Ros2Marker> meshes(*ros_, "rt/perimap/mesh", visualization_msgs_msg_dds__Marker__desc);
+  RosReader<Ros2Marker> tools(*ros_, "rt/perimap/tools", visualization_msgs_msg_dds__Marker__desc);
   RosReader<Ros2Transforms> transforms(*ros_, "rt/tf", tf2_msgs_msg_dds__TFMessage__desc);
   RosReader<Ros2Diagnostics> diagnostics(*ros_, "rt/diagnostics", diagnostic_msgs_msg_dds__DiagnosticArray__desc);
-  std::string words;
+  std::string words, tool;
   std::map<std::string, std::string> values;
   const auto until_level = [&](int level) {
     return diagnostics.until([&](const Ros2Diagnostics& told) {
       const auto& status = told.status._buffer[0];
-      if (told.status._length != 1 || status.level != level) return false;
+      if (told.status._length < 1 || status.level != level) return false;
+      tool = told.status._length > 1 ? told.status._buffer[1].message : "";
       EXPECT_STREQ(status.name, "perimap: surface");
       words = status.message;
       for (const auto& [key, value] : std::span(status.values._buffer, status.values._length)) values[key] = value;
@@ -136,6 +139,9 @@ TEST_F(BridgeRos2, WhatIsReceivedIsWhatWasPublishedAndAnInvalidSurfaceClearsIt) 
   ASSERT_TRUE(until_level(0));
   EXPECT_EQ(values["state"], "good");
   EXPECT_EQ(values["converged"], "1");
+  // A tool is told of when it has been heard for a second.
+  for (int i = 0; i < 5 && tool.empty(); ++i) ASSERT_TRUE(until_level(0));
+  EXPECT_THAT(tool, AnyOf(HasSubstr(test::kToolNow), HasSubstr(test::kToolBefore)));
   expect_points(points);
   ASSERT_TRUE(meshes.until([](const Ros2Marker& mesh) {
     if (mesh.action != 0) return false;
@@ -150,6 +156,14 @@ TEST_F(BridgeRos2, WhatIsReceivedIsWhatWasPublishedAndAnInvalidSurfaceClearsIt) 
       const auto expected = MadePublication::vertex_at(corners[k], valid);
       EXPECT_NEAR(mesh.points._buffer[k].z, 1e-3 * expected[2], 1e-7);
     }
+    return true;
+  }));
+  ASSERT_TRUE(tools.until([](const Ros2Marker& tips) {
+    if (tips.action != 0) return false;
+    EXPECT_EQ(tips.type, 7);
+    EXPECT_EQ(tips.points._length, 1U);
+    EXPECT_NEAR(tips.points._buffer[0].z, 0.097, 1e-12);
+    EXPECT_EQ(tips.lifetime.nanosec, 200'000'000U);
     return true;
   }));
   ASSERT_TRUE(transforms.until([](const Ros2Transforms& told) {
@@ -169,7 +183,11 @@ TEST_F(BridgeRos2, WhatIsReceivedIsWhatWasPublishedAndAnInvalidSurfaceClearsIt) 
   EXPECT_EQ(values["features"], "0");
   const auto empty = [](const Ros2Points& cloud) { return cloud.width == 0 && cloud.data._length == 0; };
   ASSERT_TRUE(points.until(empty));
-  ASSERT_TRUE(meshes.until([](const Ros2Marker& mesh) { return mesh.action == 3 && mesh.points._length == 0; }));
+  for (auto* markers : {&meshes, &tools}) {
+    ASSERT_TRUE(
+        markers->until([](const Ros2Marker& marker) { return marker.action == 3 && marker.points._length == 0; }));
+  }
+  EXPECT_EQ(tool, "instrument/probe: the surface is not good");
 
   perimapd_.play({});
   ASSERT_TRUE(until_level(0));

@@ -1,4 +1,4 @@
-// Publishes what a test says, at 20 surfaces a second, and remembers what it was.
+// Publishes what a test says, at 20 surfaces a second, each with a tool, and remembers what it was.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -15,8 +15,14 @@
 #include "daemon/dds/participant.hpp"
 #include "daemon/dds/writer.hpp"
 #include "made_publication.hpp"
+#include "made_tool.hpp"
 
 namespace perimap::test {
+
+// The words of its tool: where the sample of the same instant has come before the surface is taken, and, as far as they
+// are always the same, where that of the surface before is evaluated 50 ms later or more.
+inline constexpr const char* kToolNow = "instrument/probe 3.0 +- 0.2 mm, -10 mm/s";
+inline constexpr const char* kToolBefore = "instrument/probe 2.";
 
 class ScriptedPerimapd {
  public:
@@ -35,10 +41,10 @@ class ScriptedPerimapd {
     auto surfaces = dds::Writer<perimap_Surface>::create(*participant_);
     auto models = dds::Writer<perimap_SurfaceModel>::create(*participant_);
     auto meshes = dds::Writer<perimap_SurfaceMesh>::create(*participant_);
-    ASSERT_TRUE(surfaces && models && meshes);
-    thread_ = std::thread([this, s = std::move(*surfaces), m = std::move(*models), n = std::move(*meshes)]() mutable {
-      publish(s, m, n);
-    });
+    auto tools = dds::Writer<perimap_ToolDistance>::create(*participant_);
+    ASSERT_TRUE(surfaces && models && meshes && tools);
+    thread_ = std::thread([this, s = std::move(*surfaces), m = std::move(*models), n = std::move(*meshes),
+                           t = std::move(*tools)]() mutable { publish(s, m, n, t); });
   }
   ~ScriptedPerimapd() {
     stopping_ = true;
@@ -62,7 +68,7 @@ class ScriptedPerimapd {
   static constexpr std::int64_t kRounded_ns = 50;
 
   void publish(dds::Writer<perimap_Surface>& surfaces, dds::Writer<perimap_SurfaceModel>& models,
-               dds::Writer<perimap_SurfaceMesh>& meshes) {
+               dds::Writer<perimap_SurfaceMesh>& meshes, dds::Writer<perimap_ToolDistance>& tools) {
     MadePublication made;
     for (std::uint64_t i = 1; !stopping_; ++i) {
       const Instant release = MonotonicClock::now();
@@ -83,6 +89,7 @@ class ScriptedPerimapd {
           published_[to_ns(release) + MadePublication::kUtcMinusMonotonic_ns] = act;
         }
         EXPECT_GE(surfaces.write(surface), 0);
+        EXPECT_GE(tools.write(made_tool(to_ns(release), "instrument/probe", i)), 0);
       }
       std::this_thread::sleep_for(std::chrono::milliseconds(50));
     }

@@ -49,12 +49,14 @@ template <class T, class Type>
 class FastReader final : public fast::DataReaderListener {
  public:
   using Judge = bool (*)(const T&);
-  FastReader(FastDomain& domain, const char* name, Judge judge) : judge_(judge) {
+  FastReader(FastDomain& domain, const char* name, Judge judge,
+             fast::ReliabilityQosPolicyKind reliability = fast::RELIABLE_RELIABILITY_QOS)
+      : judge_(judge) {
     fast::TypeSupport type(new Type());
     type.register_type(domain.participant);
     fast::Topic* topic = domain.participant->create_topic(name, type.get_type_name(), fast::TOPIC_QOS_DEFAULT);
     fast::DataReaderQos qos = fast::DATAREADER_QOS_DEFAULT;
-    qos.reliability().kind = fast::RELIABLE_RELIABILITY_QOS;
+    qos.reliability().kind = reliability;
     expect(topic != nullptr && domain.subscriber->create_datareader(topic, qos, this) != nullptr, name);
   }
   void on_data_available(fast::DataReader* reader) override {

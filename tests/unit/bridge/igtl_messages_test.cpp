@@ -25,8 +25,8 @@ ShownSurface good() {
   return shown;
 }
 
-test::IgtlReceived surface_in(const IgtlOutgoing& message) {
-  EXPECT_EQ(message.subject, Subject::kSurface);
+test::IgtlReceived points_in(const IgtlOutgoing& message, Subject subject) {
+  EXPECT_EQ(message.subject, subject);
   const auto polydata = test::IgtlReceiver::unpacked<igtl::PolyDataMessage>(*message.bytes);
   test::IgtlReceived got;
   got.device = polydata->GetDeviceName();
@@ -36,6 +36,8 @@ test::IgtlReceived surface_in(const IgtlOutgoing& message) {
   test::IgtlReceiver::take_surface(polydata, got);
   return got;
 }
+
+test::IgtlReceived surface_in(const IgtlOutgoing& message) { return points_in(message, Subject::kSurface); }
 
 TEST(IgtlMessages, AMeshIsItsVerticesTrianglesAndDeviations) {
   ShownSurface shown = good();
@@ -103,6 +105,48 @@ TEST(IgtlMessages, TheCameraIsATransformInMm) {
   transform->GetTimeStamp(stamp);
   EXPECT_EQ(stamp->GetSecond(), 1'795'000'005U);
   EXPECT_NEAR(stamp->GetNanosecond(), 73'456'789.0, 50.0);  // the library rounds
+}
+
+ShownTool probe() {
+  ShownTool tool;
+  tool.name = "instrument/probe";
+  tool.at.refusal = client::ToolRefusal::kNone;
+  tool.at.state = perimap_TOOL_GOOD;
+  tool.at.distance_mm = 3.25;
+  tool.at.deviation_mm = 0.5;
+  tool.at.rate_mm_per_s = -7.0;
+  tool.at.tip_known = true;
+  tool.at.tip_W_mm = {1, 2, 3};
+  return tool;
+}
+
+TEST(IgtlMessages, ToolsAreVerticesAndLinesOfWords) {
+  ShownSurface shown = good();
+  shown.tools = {probe(), probe(), probe()};
+  shown.tools[1].name = "pointer";
+  shown.tools[1].at = {};
+  shown.tools[1].at.refusal = client::ToolRefusal::kPublisher;
+  shown.tools[1].at.reason = perimap_TOOL_REASON_NOT_SEEN;
+  shown.tools[2].name = "instrument/hook";
+  shown.tools[2].at.touches = true;
+  const auto got = points_in(pack_tools(shown), Subject::kTools);
+  EXPECT_EQ(got.device, "PerimapTools");
+  ASSERT_EQ(got.points.size(), 2U);  // nobody knows where the pointer is
+  EXPECT_THAT(got.points[0], ElementsAre(1.0F, 2.0F, 3.0F));
+  EXPECT_THAT(got.vertices, ElementsAre(0U, 1U));
+  EXPECT_THAT(got.scalars.at("line"), ElementsAre(0.0F, 2.0F));
+  EXPECT_THAT(got.scalars.at("distance_mm"), ElementsAre(3.25F, 3.25F));
+  EXPECT_THAT(got.scalars.at("deviation_mm"), ElementsAre(0.5F, 0.5F));
+  EXPECT_THAT(got.scalars.at("touches"), ElementsAre(0.0F, 1.0F));
+  const auto text = test::IgtlReceiver::unpacked<igtl::StringMessage>(*pack_tool_words(shown).bytes);
+  EXPECT_STREQ(text->GetString(),
+               "instrument/probe 3.2 +- 0.5 mm, -7 mm/s\npointer: the tracker does not see it\n"
+               "instrument/hook TOUCHES, 3.2 +- 0.5 mm, -7 mm/s");
+}
+
+TEST(IgtlMessages, WithoutToolsVerticesAndWordsAreEmpty) {
+  EXPECT_THAT(points_in(pack_tools({}), Subject::kTools).points, IsEmpty());
+  EXPECT_STREQ(test::IgtlReceiver::unpacked<igtl::StringMessage>(*pack_tool_words({}).bytes)->GetString(), "");
 }
 
 TEST(IgtlMessages, AStateIsACodeAWordAndASentence) {

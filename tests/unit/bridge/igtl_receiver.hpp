@@ -6,6 +6,7 @@
 #include <igtlMessageHeader.h>
 #include <igtlPolyDataMessage.h>
 #include <igtlStatusMessage.h>
+#include <igtlStringMessage.h>
 #include <igtlTimeStamp.h>
 #include <igtlTransformMessage.h>
 
@@ -35,7 +36,7 @@ struct IgtlReceived {
   // STATUS
   int code = 0;
   std::int64_t sub_code = 0;
-  std::string name, words;
+  std::string name, words;  // words: of a STRING too
 };
 
 class IgtlReceiver {
@@ -77,6 +78,10 @@ class IgtlReceiver {
       got.sub_code = status->GetSubCode();
       got.name = status->GetErrorName();
       got.words = status->GetStatusString();
+    } else if (got.type == "STRING") {
+      const auto text = body<igtl::StringMessage>(header);
+      if (text.IsNull()) return std::nullopt;
+      got.words = text->GetString();
     } else {
       ADD_FAILURE() << "a message of type " << got.type;
     }

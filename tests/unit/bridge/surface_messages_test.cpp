@@ -72,6 +72,35 @@ TEST_F(SurfaceMessagesTest, StandAtTheInstantThatTheySpeakOf) {
   EXPECT_NEAR(transform->translation.y, -0.02, 1e-12);
 }
 
+TEST_F(SurfaceMessagesTest, AToolIsASphereWithItsWordsAndAWayToTheSurface) {
+  ShownSurface shown = good();
+  ShownTool tool;
+  tool.name = "pointer";
+  tool.at.refusal = client::ToolRefusal::kNone;
+  tool.at.state = perimap_TOOL_GOOD;
+  tool.at.distance_mm = 3.25;
+  tool.at.deviation_mm = 0.5;
+  tool.at.rate_mm_per_s = 0.0;
+  tool.at.tip_known = true;
+  tool.at.tip_W_mm = {1, 2, 3};
+  tool.nearest_W_mm = {1, 2, 6};
+  shown.tools = {tool, tool};
+  shown.tools[1].at.tip_known = false;  // nobody knows where this one is
+  const auto messages = maker_.of(shown, from_ns(1));
+  ASSERT_TRUE(messages) << messages.error().message;
+  const auto scene = read<foxglove_SceneUpdate>(*messages, SurfaceChannel::kScene);
+  ASSERT_EQ(scene->entities._length, 3U);
+  const foxglove_SceneEntity& tools = scene->entities._buffer[2];
+  EXPECT_STREQ(tools.id, "tools");
+  ASSERT_EQ(tools.spheres._length, 1U);
+  EXPECT_NEAR(tools.spheres._buffer[0].pose.position.z, 0.003, 1e-12);
+  ASSERT_EQ(tools.texts._length, 1U);
+  EXPECT_STREQ(tools.texts._buffer[0].text, "pointer 3.2 +- 0.5 mm, +0 mm/s");
+  ASSERT_EQ(tools.lines._length, 1U);
+  ASSERT_EQ(tools.lines._buffer[0].points._length, 2U);
+  EXPECT_NEAR(tools.lines._buffer[0].points._buffer[1].z, 0.006, 1e-12);
+}
+
 TEST_F(SurfaceMessagesTest, OfNothingTakeAwayWhatWasShown) {
   ASSERT_TRUE(maker_.of(good(), from_ns(1)));
   ShownSurface nothing;

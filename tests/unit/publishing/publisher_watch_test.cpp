@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "made_tool.hpp"
 #include "perimap_publisher_watch.hpp"
 
 namespace perimap::client {
@@ -267,6 +268,63 @@ TEST_F(Watching, TheTopicsOfOneProgramAreOnePublisherAndAForgedModelIsNoticedBes
   EXPECT_NE(watch_.hear(forged, 99, now_ + 4'005 * kMs), Hearing::kUse);
   EXPECT_NE(watch_.hear(model, 12, now_ + 4'006 * kMs), Hearing::kUse);
   EXPECT_EQ(watch_.state(now_ + 4'007 * kMs), Hearing::kTwoPublishers);
+}
+
+// What a tool is said to be is acted on as a surface is.
+TEST_F(Watching, EachToolIsAStreamOfItsOwnAndAForgedOneIsNoticed) {
+  std::uint64_t sequence = 0;
+  const auto tell = [&](const char* name, std::uint64_t writer, std::int64_t now) {
+    return watch_.hear(test::made_tool(now, name, sequence), writer, now);
+  };
+  for (int i = 1; i <= 200; ++i) {
+    const std::int64_t now = now_ + i * 10 * kMs;
+    ++sequence;
+    EXPECT_EQ(a_.speak(watch_, now), Hearing::kUse);
+    const Hearing expected = i > 100 ? Hearing::kUse : Hearing::kListening;
+    EXPECT_EQ(tell("pointer", 15, now), expected) << i;
+    EXPECT_EQ(tell("instrument/probe", 15, now), expected) << i;
+  }
+  const std::int64_t now = now_ + 2'005 * kMs;
+  EXPECT_NE(tell("instrument/probe", 99, now), Hearing::kUse);
+  ++sequence;
+  EXPECT_NE(tell("instrument/probe", 15, now + kMs), Hearing::kUse);
+  EXPECT_EQ(watch_.state(now + 2 * kMs), Hearing::kTwoPublishers);
+}
+
+TEST_F(Watching, MoreToolsInTurnThanThereAreLanesAreFollowedAsFarAsAnybodyCan) {
+  for (int i = 0; i < 400; ++i) {
+    const std::int64_t now = now_ + i * 10 * kMs;
+    a_.speak(watch_, now);
+    const std::string name = "instrument/" + std::to_string(i % 40);
+    watch_.hear(test::made_tool(now, name, static_cast<std::uint64_t>(i / 40 + 1)), 15, now);
+  }
+  EXPECT_EQ(watch_.state(now_ + 4'000 * kMs), Hearing::kUse);
+}
+
+TEST_F(Watching, AToolWhoseNumbersAreNoneIsImplausible) {
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  std::int64_t t = now_;
+  std::uint64_t sequence = 0;
+  const auto after = [&](auto spoil) {
+    EXPECT_EQ(a_.speak_for(watch_, t + kPeriod, t + 2'100 * kMs), Hearing::kUse);
+    t += 2'100 * kMs + kPeriod;
+    perimap_ToolDistance tool = test::made_tool(t, "pointer", ++sequence);
+    spoil(tool);
+    return watch_.hear(tool, 15, t);
+  };
+  after([](perimap_ToolDistance&) {});
+  EXPECT_EQ(after([](perimap_ToolDistance&) {}), Hearing::kUse);
+  EXPECT_EQ(after([&](perimap_ToolDistance& tool) { tool.distances_mm[0] = nan; }), Hearing::kImplausible);
+  EXPECT_EQ(after([&](perimap_ToolDistance& tool) { tool.deviations_mm[2] = -1.0; }), Hearing::kImplausible);
+  EXPECT_EQ(after([&](perimap_ToolDistance& tool) { tool.tip_W_mm[1] = nan; }), Hearing::kImplausible);
+  EXPECT_EQ(after([&](perimap_ToolDistance& tool) { tool.states[1] = 7; }), Hearing::kImplausible);
+  EXPECT_EQ(after([&](perimap_ToolDistance& tool) { tool.valid_until_ns = 0; }), Hearing::kImplausible);
+  // What is told as not known is no number, and harms nobody.
+  EXPECT_EQ(after([&](perimap_ToolDistance& tool) {
+              tool.states[2] = perimap_TOOL_INVALID;
+              tool.distances_mm[2] = nan;
+            }),
+            Hearing::kUse);
 }
 
 TEST(PublisherWatchWords, AreThereForEveryAnswer) {

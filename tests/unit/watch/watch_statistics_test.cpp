@@ -261,7 +261,7 @@ perimap_ToolDistance tool(std::uint64_t sequence, const char* name = "instrument
   dds::assign(tool.source, "a");
   dds::assign(tool.tool, name);
   tool.sample_sequence = sequence;
-  tool.state = perimap_TOOL_GOOD;
+  tool.state = tool.states[0] = perimap_TOOL_GOOD;
   tool.distances_mm[0] = 3.21;
   tool.deviations_mm[0] = 0.4;
   tool.rates_mm_per_s[0] = -12.0;
@@ -294,8 +294,8 @@ TEST(WatchStatistics, AToolThatIsNotKnownIsSaidSoAndHasNoNumbers) {
   WatchStatistics statistics;
   statistics.add(surface(1), release_of(surface(1)));
   perimap_ToolDistance lost = tool(1);
-  lost.state = perimap_TOOL_INVALID;
-  lost.reason = perimap_TOOL_REASON_NOT_SEEN;
+  lost.state = lost.states[0] = perimap_TOOL_INVALID;
+  lost.reason = lost.reasons[0] = perimap_TOOL_REASON_NOT_SEEN;
   lost.distances_mm[0] = std::nan("");
   statistics.add(lost);
   const StreamReport report = statistics.totals()[0];

@@ -1,6 +1,5 @@
 #!/bin/bash
-# mesh_is_read.sh PUBLISHER READER DEPLOY: a reader of another vendor, Fast DDS, takes perimap/surface_mesh as it is
-# published.
+# topic_is_read.sh PUBLISHER READER DEPLOY: a reader of another vendor, Fast DDS, takes a topic as perimapd publishes it.
 set -euo pipefail
 publisher=$1 reader=$2 deploy=$3
 # Fast DDS does not know Cyclone's tag, by which other tests are kept apart: a domain that others hardly have.
