@@ -45,11 +45,11 @@ tests=(
   libgtest-dev libgmock-dev
   clang-16 libclang-rt-16-dev                # AddressSanitizer, fuzzing
   nodejs=node npm=npm ca-certificates        # recordings are read back by the official npm packages
+  chromium                                   # the pages that perimap shows and writes, opened
 )
 full=(
   clang-tidy clang-format
   qemu-system-x86 busybox-static cpio zstd kmod udev iproute2 v4l-utils  # tests/vm: CAN, V4L2 and systemd on Debian's own kernels
-  chromium                                   # the pages that perimap writes, opened
   fastddsgen libfastrtps-dev libfastcdr-dev  # another vendor's DDS reads what is published
   stress-ng                                  # perimap bench: latencies under load
   lintian systemd man-db apparmor            # the Debian package and its service, checked
