@@ -23,11 +23,12 @@ constexpr Duration kTakenEvery = std::chrono::microseconds(33333);
 constexpr std::size_t with_spare(std::size_t wanted) { return 2 * wanted; }
 
 // As many as may be followed are not all to lie where the scope looks first: so far apart that a picture full of tissue
-// takes them all, and one with less of it leaves some for what comes into view.
+// takes 120, or as many as there may be where those are fewer, and what comes into view takes the others.
 double spread_px(const PipelineSettings& settings) noexcept {
   constexpr double kOfEvenSpacing = 0.63;
+  constexpr int kInOnePicture = 120;
   const double pixels = static_cast<double>(settings.camera.width) * settings.camera.height;
-  return kOfEvenSpacing * std::sqrt(pixels / settings.features.maximum);
+  return kOfEvenSpacing * std::sqrt(pixels / std::min(settings.features.maximum, kInOnePicture));
 }
 
 }  // namespace

@@ -24,7 +24,7 @@ namespace perimap {
 struct OrganModel;
 
 struct FeatureSettings {
-  int maximum = 120;
+  int maximum = 200;  // some for what comes into view later
   Duration detection_interval = std::chrono::milliseconds(333);
   double minimum_distance_px = 18.0;
 };

@@ -153,7 +153,7 @@ struct PipelineConfiguration {
 };
 
 struct FeaturesConfiguration {
-  int maximum = 120;
+  int maximum = 200;
   Duration detection_interval = std::chrono::milliseconds(333);
   double minimum_distance_px = 18.0;
 

@@ -2,7 +2,7 @@
 // the front (docs/decisions/0089).
 import {clear, font, scaled} from "./canvas.mjs";
 import {drawFeature} from "./marks.mjs";
-import {kToolColour, kTouchColour, toolWords} from "./tools.mjs";
+import {kToolColour, kTouchColour, shortName} from "./tools.mjs";
 import {worse} from "./trust.mjs";
 
 export const kMeshColours = {good: [63, 208, 164], degraded: [242, 182, 50]};
@@ -225,7 +225,7 @@ export class Scene {
       context.closePath();
       if (tool.state === "invalid") context.stroke();  // hollow: where it is, and not how far
       else context.fill();
-      this.label(context, width, height, x, y, toolWords(tool).words);
+      this.label(context, width, height, x, y, shortName(tool.tool));
     }
   }
 

@@ -4,7 +4,7 @@ import {worse} from "./trust.mjs";
 export const kToolColour = "#ff73cc", kTouchColour = "#ffffff";
 const kStillMmPerS = 2;  // slower neither approaches nor goes away
 
-const shortName = (tool) => tool.replace(/^instrument\//, "");
+export const shortName = (tool) => tool.replace(/^instrument\//, "");
 
 // {state, words, touches} of a tool as the server tells it. Nothing is told of one beside a surface that is not to be used.
 export function toolWords(tool, surfaceState = "good") {

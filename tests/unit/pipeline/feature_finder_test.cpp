@@ -41,6 +41,7 @@ struct Still {
     PipelineSettings s;
     s.camera.width = width;
     s.camera.height = height;
+    s.features.maximum = 120;  // so many in each of six bands
     s.lockstep = true;
     return s;
   }
