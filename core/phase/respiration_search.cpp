@@ -212,6 +212,14 @@ bool RespirationSearch::find_at(double rate_rad_per_s, FoundBreath& found) const
   return is_known(found);
 }
 
+FoundBreath RespirationSearch::lately(double rate_rad_per_s) const noexcept {
+  if (!(rate_rad_per_s > 0.0) || count_ - oldest() < kLeastBins) return {};
+  const double window_s = settings_.breaths * kTwoPi / rate_rad_per_s;
+  std::uint64_t first = oldest();
+  while (span_s(first) > window_s && count_ - first > kLeastBins) ++first;
+  return breath_at(rate_rad_per_s, true, first);
+}
+
 FoundBreath RespirationSearch::surest(double rate_rad_per_s, double width_rad_per_s, double breaths) const noexcept {
   constexpr auto kBinsASecond = static_cast<std::uint64_t>(std::chrono::seconds(1) / kBin);
   static_assert(kBinsASecond < kLeastBins);

@@ -75,6 +75,9 @@ class RespirationSearch {
   // The same where the rate is known: two breaths are enough. (After one, a young map has taken part of it in.) What is
   // not known of the rate is not counted.
   [[nodiscard]] bool find_at(double rate_rad_per_s, FoundBreath& found) const noexcept;
+  // How much of the displacement of the last breaths alone, so many as must have been seen, is a wave of that rate:
+  // what a map that was young got wrong is not in them any more. Explains nothing where there is too little.
+  [[nodiscard]] FoundBreath lately(double rate_rad_per_s) const noexcept;
 
  private:
   static constexpr int kBins = 300;

@@ -28,6 +28,10 @@ constexpr double kPersistentDeviation_rad = 0.4;
 constexpr double kSamePeriod = 0.015;  // share
 constexpr Duration kPersists = std::chrono::seconds(10);
 constexpr Duration kSuspicionLasts = std::chrono::seconds(15);
+// Sooner where so many searches in a row, in which a pause of some seconds has no room, find that little of the wave in
+// the last breaths.
+constexpr double kGone = 0.5;  // of what is suspected
+constexpr int kGoneInARow = 4;
 constexpr Duration kLongestTold = std::chrono::milliseconds(200);  // by one frame
 constexpr Duration kContradictedBeforeSearch = std::chrono::milliseconds(1500);
 constexpr Duration kSilentBeforeSearch = std::chrono::seconds(15);
@@ -141,16 +145,27 @@ void RespiratoryTracker::track_signal(const BreathSignal& signal, Instant now) n
 }
 
 // A map without breathing follows it in part, which leaves a weak trace of it. That is enough to reckon with its
-// displacement; the map then stands still, and breathing shows clearly or not at all.
+// displacement; the map then stands still, and breathing shows clearly or not at all. Of a map that was young the
+// displacement may look like two or three breaths, which half a minute remembers: the last breaths must show them too.
 void RespiratoryTracker::suspect(const FoundBreath& found, Instant now) noexcept {
-  const bool large = found.wave.rms_mm() >= settings_.suspected_rms_mm;
-  const bool there = large && found.explained >= (clock_.suspected ? kConfirmed : kSuspected);
+  const auto is_there = [this](const FoundBreath& wave, double least_explained) {
+    return wave.wave.rms_mm() >= settings_.suspected_rms_mm && wave.explained >= least_explained;
+  };
+  const bool there = is_there(found, clock_.suspected ? kConfirmed : kSuspected) &&
+                     is_there(search_.lately(found.rate_rad_per_s), kSuspected);
   in_a_row_ = there ? in_a_row_ + 1 : 0;
   if (in_a_row_ >= kSuspectedInARow) {
     clock_.suspected = true;
     last_agreed_ = now;
+    suspected_rad_per_s_ = found.rate_rad_per_s;
   }
-  if (now - last_agreed_ > kSuspicionLasts) clock_.suspected = false;
+  const bool gone = search_.lately(suspected_rad_per_s_).wave.rms_mm() < kGone * settings_.suspected_rms_mm;
+  gone_in_a_row_ = clock_.suspected && suspected_rad_per_s_ > 0.0 && gone ? gone_in_a_row_ + 1 : 0;
+  if (gone_in_a_row_ >= kGoneInARow || now - last_agreed_ > kSuspicionLasts) {
+    clock_.suspected = false;
+    suspected_rad_per_s_ = 0.0;
+    gone_in_a_row_ = 0;
+  }
 }
 
 void RespiratoryTracker::predict(Instant t) noexcept {

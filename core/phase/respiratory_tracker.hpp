@@ -88,8 +88,10 @@ class RespiratoryTracker {
   Duration first_breath_{};  // after a lock, until the map has learnt one
   Duration told_for_{};      // since the lock: in which images agreed with the clock
   int locks_ = 0;
-  int in_a_row_ = 0;                 // searches that found what looks like breathing, while off
-  double candidate_period_s_ = 0.0;  // of persists(); 0: none
+  int in_a_row_ = 0;                  // searches that found what looks like breathing, while off
+  double suspected_rad_per_s_ = 0.0;  // while off; 0: nothing is, or it was before
+  int gone_in_a_row_ = 0;             // searches that found hardly anything of it
+  double candidate_period_s_ = 0.0;   // of persists(); 0: none
   Instant candidate_since_;
 };
 

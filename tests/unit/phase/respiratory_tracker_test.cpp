@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <random>
+#include <utility>
 
 #include "breathing_patient.hpp"
 #include "core/angle/angle.hpp"
@@ -187,6 +188,59 @@ TEST_F(Tracking, WhileOffBreathingIsSuspectedWhereThereIsSome) {
   }
   EXPECT_FALSE(calm.clock().suspected);
   EXPECT_EQ(calm.clock().at(at_s(20.0)).deviation_mm, 0.0);
+}
+
+// The seconds of `now_s` until `to_s`, one search in each; how many of them ended in a suspicion.
+int suspected_seconds(RespiratoryTracker& tracker, Patient& patient, double& now_s, double to_s) {
+  int suspected = 0;
+  for (; now_s < to_s; now_s += 1.0) {
+    watch(tracker, patient, now_s, now_s + 1.0);
+    tracker.search(at_s(now_s + 1.0));
+    suspected += tracker.clock().suspected ? 1 : 0;
+  }
+  return suspected;
+}
+
+// Two waves of the map itself, at twice the heart's period, as records with a slow heart showed.
+TEST_F(Tracking, WhileOffWhatAYoungMapGetsWrongForTwoBreathsIsNoSuspicion) {
+  settings.enabled = false;
+  for (const double fades_s : {0.6, 0.9, 1.2}) {
+    RespiratoryTracker tracker(settings);
+    for (int i = 0; i < 900; ++i) {
+      const double t = i / 30.0;
+      const double wave_mm = 8.0 * std::exp(-t / fades_s) * std::cos(kTwoPi * t / 2.4);
+      const Vector3d noise(patient.normal(patient.generator), patient.normal(patient.generator), 0.0);
+      tracker.add_displacement(at_s(t), Vector3d(wave_mm, 0.3 * wave_mm, 0.0) + 0.05 * noise, Patient::cardiac_rad(t));
+      if (i % 30 == 29) tracker.search(at_s(t));
+      ASSERT_FALSE(tracker.clock().suspected) << t << " s, fades in " << fades_s;
+    }
+  }
+}
+
+TEST_F(Tracking, WhileOffASuspicionStandsWhileThereIsBreathingAndGoesSoonAfterIt) {
+  settings.enabled = false;
+  RespiratoryTracker tracker(settings);
+  EXPECT_GE(suspected_seconds(tracker, patient, now_s, 40.0), 25);
+  ASSERT_TRUE(tracker.clock().suspected);
+  patient.amplitude_mm = 0.0;
+  patient.noise_mm = 0.1;
+  // Two breaths and a little must have passed without it, and four searches more.
+  EXPECT_GE(suspected_seconds(tracker, patient, now_s, 54.0), 8);
+  EXPECT_FALSE(tracker.clock().suspected);
+  EXPECT_EQ(suspected_seconds(tracker, patient, now_s, 100.0), 0);
+}
+
+TEST_F(Tracking, WhileOffAPauseOfABreathIsNoEndOfTheSuspicion) {
+  settings.enabled = false;
+  RespiratoryTracker tracker(settings);
+  suspected_seconds(tracker, patient, now_s, 40.0);
+  ASSERT_TRUE(tracker.clock().suspected);
+  for (int pause = 0; pause < 3; ++pause) {
+    const double amplitude_mm = std::exchange(patient.amplitude_mm, 0.0);
+    EXPECT_EQ(suspected_seconds(tracker, patient, now_s, now_s + 4.0), 4);
+    patient.amplitude_mm = amplitude_mm;
+    EXPECT_EQ(suspected_seconds(tracker, patient, now_s, now_s + 12.0), 12);
+  }
 }
 
 }  // namespace
