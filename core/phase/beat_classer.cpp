@@ -6,7 +6,8 @@
 namespace perimap {
 namespace {
 constexpr double kUsual = 0.9;          // correlation with the usual shape from which on a beat is of it
-constexpr int kConductionChanged = 4;   // beats in a row
+constexpr int kConductionChanged = 4;   // beats in a row,
+constexpr int kEctopicRun = 12;         // of a kind that has come early before
 constexpr int kDisplaced = 4;           // steps, 20 ms
 constexpr double kDoubtful = 0.3;       // confidence below which an unusual shape is thought noise,
 constexpr double kMostDoubtful = 0.15;  // and a usual one, unless it comes when a beat is due
@@ -46,6 +47,7 @@ VentricularEvidence BeatClasser::evidence_of(const RPeak& peak, const BeatKinds:
   evidence.recurs = compared.recurs;
   evidence.apart = compared.apart;
   evidence.coupled = compared.coupled;
+  evidence.after_one = last_ventricular_;
   evidence.kind_log_rr = compared.log_rr;
   evidence.kind_scatter = compared.scatter;
   return evidence;
@@ -89,9 +91,11 @@ RPeak BeatClasser::classify(RPeak peak) noexcept {
   const bool early =
       has_last_ && normal_rr_s_.count() > 0 && to_seconds(peak.time - last_) < kEarly * normal_rr_s_.median();
   const bool again = compared.kind >= 0 && compared.kind == last_kind_ && !early;
-  on_time_in_one_shape_ = again ? std::min(on_time_in_one_shape_ + 1, kConductionChanged + 1) : 0;
+  on_time_in_one_shape_ = again ? std::min(on_time_in_one_shape_ + 1, kEctopicRun + 1) : 0;
+  if (!again) ectopic_run_ = compared.log_rr < kCameEarly;
   const VentricularEvidence evidence = evidence_of(peak, compared);
-  const bool ventricular = on_time_in_one_shape_ < kConductionChanged && this->ventricular(peak, evidence);
+  const bool ventricular =
+      on_time_in_one_shape_ < (ectopic_run_ ? kEctopicRun : kConductionChanged) && this->ventricular(peak, evidence);
   // In fibrillation beats come at any time, and so do those of a heart that a pacemaker waits for.
   const bool own = own_of_paced(evidence) > kOwn;
   const bool at_any_time = rhythm_.rhythm() == Rhythm::kUnpredictable || own;
@@ -105,6 +109,7 @@ RPeak BeatClasser::classify(RPeak peak) noexcept {
   learn_kind(peak, compared);
   if (has_last_) learn_rhythm(peak, unusual || own);
   last_unusual_ = peak.unusual_shape;
+  last_ventricular_ = ventricular;
   last_ = peak.time;
   last_class_ = peak.beat_class;
   has_last_ = true;

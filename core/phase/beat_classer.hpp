@@ -3,8 +3,9 @@
 // Causal: the class is said with the beat and not revised. A premature beat is ventricular (ventricular_evidence), or
 // comes much too early in the usual shape (atrial), unless the rhythm is one in which beats come at any time. A
 // ventricular beat may come on time as well, when its kind recurs; where beats go on in that shape, on time, the
-// patient's conduction has changed, and they are normal to the rhythm. The beat after a premature one is measured from
-// the last normal beat as well, so that neither an interpolated beat nor a compensatory pause makes it irregular.
+// patient's conduction has changed, and they are normal to the rhythm, sooner where the kind was not one that comes
+// early. The beat after a premature one is measured from the last normal beat as well, so that neither an interpolated
+// beat nor a compensatory pause makes it irregular.
 #pragma once
 
 #include "core/phase/beat_kinds.hpp"
@@ -29,6 +30,7 @@ class BeatClasser {
     has_normal_ = false;
     raw_rr_s_ = 0.0;
     last_kind_ = -1;
+    last_ventricular_ = false;
   }
 
  private:
@@ -54,7 +56,9 @@ class BeatClasser {
   RhythmScatter scatter_;  // of intervals between beats of the usual kind
   bool last_usual_kind_ = false;
   bool last_unusual_ = false;
-  int on_time_in_one_shape_ = 0;  // in a row, after the first
+  bool last_ventricular_ = false;
+  int on_time_in_one_shape_ = 0;  // in a row, after the first,
+  bool ectopic_run_ = false;      // of a kind that had come early before
   int last_kind_ = -1;
   BeatClass last_class_ = BeatClass::kNormal;
   Instant last_;

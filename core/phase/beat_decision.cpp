@@ -287,6 +287,9 @@ bool BeatDecision::known(const Waiting& waiting, Instant now, bool ending) const
   const Duration age = now - waiting.candidate.time;
   if (age < settings_.cut_off && waiting.probability < settings_.certain) return false;
   const bool starting = beats_told_ < settings_.beats_at_start && !familiar(waiting);
+  // While there is nothing to hold it against, what is no beat by itself is none because one is due: it may be a P wave
+  // that is not conducted.
+  if (starting && waiting.log_odds < -settings_.sure_by_itself) return false;
   const bool stranger = clusters_.any_settled() && !familiar(waiting);
   const bool may_be_followed = clusters_.followers(waiting.cluster) >= settings_.followed_by_chance;
   if (!starting && !stranger && !may_be_followed && waiting.probability >= settings_.sure &&

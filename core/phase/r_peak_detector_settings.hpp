@@ -53,10 +53,11 @@ struct CandidateSettings {
 };
 
 struct DecisionSettings {
-  double sure = 0.9;                                         // probability from which on a beat is told at once (dev)
-  double more_likely = 0.5;                                  // and when it has had its time: more likely than not
-  Duration time_to_decide = std::chrono::milliseconds(330);  // when a P wave's own QRS complex would have been measured
-  Duration time_if_known = std::chrono::milliseconds(180);   // of a kind that is known to be none
+  double sure = 0.9;         // probability from which on a beat is told at once (dev)
+  double more_likely = 0.5;  // and when it has had its time: more likely than not
+  // When a P wave's own QRS complex would have been measured: the longest PR interval that is usual, 260 ms, and 90 ms.
+  Duration time_to_decide = std::chrono::milliseconds(350);
+  Duration time_if_known = std::chrono::milliseconds(180);      // of a kind that is known to be none
   Duration time_of_strangers = std::chrono::milliseconds(195);  // what is like nothing: the beat itself may yet come,
   double before_due = 0.85;                                     // unless it comes so early, in usual cycles
   Duration cut_off = std::chrono::milliseconds(49);    // before the signal's end: half the shape is made up, and a beat
@@ -64,7 +65,8 @@ struct DecisionSettings {
   Duration too_late = std::chrono::milliseconds(950);  // after that a beat is told no more
   Duration evaluate_every = std::chrono::milliseconds(20);
   double larger = 1.2;          // energy, by which another measure of one complex is the better one
-  double sure_by_itself = 0.7;  // log odds that the complex alone must have for it: rhythm makes no beat
+  double sure_by_itself = 0.7;  // log odds that the complex alone must have for it, and the other way at the start,
+                                // when as much against it makes it none: rhythm makes no beat
   Duration time_at_start = std::chrono::milliseconds(700);
   int beats_at_start = 3;  // until so many are known none is told at once: the first wave may be a P wave
   Duration refractory = std::chrono::milliseconds(180);  // of the ventricles; Pan & Tompkins 1985 have 200 ms

@@ -23,6 +23,8 @@ constexpr double kNarrower = -3.2;          // a unit of the logarithm,
 constexpr double kNarrowest = 0.5;          // to here,
 constexpr double kWider = 3.0;              // and a unit the other way,
 constexpr double kWidest = 0.5;             // to here
+constexpr double kWiderAfterOne = 4.0;      // the same after a ventricular beat,
+constexpr double kWideAfterOne = 0.1;       // fully from here on
 constexpr double kOwn = -8.0;               // of a paced heart's own beat, which is narrower by more than
 constexpr double kOwnFrom = 0.0;            // this,
 constexpr double kOwnFully = 0.15;          // fully from here on,
@@ -51,11 +53,14 @@ double own_of_paced(const VentricularEvidence& evidence) noexcept {
 
 double log_odds(const VentricularEvidence& evidence) noexcept {
   const double early = -evidence.log_rr / (evidence.spread + kLeastSpread);
+  // A bundle branch is wide as well, but its beats are not early.
+  const bool ectopic_after_one = evidence.recurs && evidence.after_one && evidence.kind_log_rr < kCameEarly;
   return kAlways + kUnlike * std::clamp(std::log(evidence.unlike), kLeast, kMost) +
          kEarly * std::clamp(early, kLate, kFarEarly) +
          kIntervalBefore * std::clamp(evidence.log_rr_before, -1.0, kLongestBefore) +
          kNarrower * std::clamp(evidence.narrower, 0.0, kNarrowest) +
          (evidence.recurs ? kWider * std::clamp(-evidence.narrower, 0.0, kWidest) : 0.0) +
+         (ectopic_after_one ? kWiderAfterOne * rising(-evidence.narrower, 0.0, kWideAfterOne) : 0.0) +
          (evidence.paced ? kPaced : 0.0) + kOwn * own_of_paced(evidence) +
          (evidence.coupled ? kCoupled
           : evidence.apart ? kApart

@@ -128,8 +128,19 @@ TEST_F(Classed, VentricularBeatThatComesOnTimeIsNoneTheLessOne) {
 
 TEST_F(Classed, ConductionThatHasChangedIsNormalFromItsFifthBeatOn) {
   settle();
-  ventricular_beats();
+  for (int i = 0; i < 6; ++i) {
+    beat(805, 0.4);
+    for (int k = 0; k < 4; ++k) EXPECT_EQ(beat(805), BeatClass::kNormal);
+  }
   for (int i = 0; i < 4; ++i) EXPECT_EQ(beat(800, 0.4), BeatClass::kPremature) << i;
+  for (int i = 0; i < 40; ++i) EXPECT_EQ(beat(800 + 10 * (i % 3), 0.4), BeatClass::kNormal) << i;
+}
+
+// A run of ventricular beats at the rate of the usual ones, and at last another conduction after all.
+TEST_F(Classed, ARunOfAKindThatHasComeEarlyIsVentricularForTwelveBeats) {
+  settle();
+  ventricular_beats();
+  for (int i = 0; i < 12; ++i) EXPECT_EQ(beat(800, 0.4), BeatClass::kPremature) << i;
   for (int i = 0; i < 40; ++i) EXPECT_EQ(beat(800 + 10 * (i % 3), 0.4), BeatClass::kNormal) << i;
 }
 

@@ -4,6 +4,9 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <random>
+
+#include "core/phase/ecg_filter.hpp"
 
 namespace perimap::test {
 namespace {
@@ -60,6 +63,35 @@ TEST_F(Disturbances, WhatStandsOutIsSeveralTimesAsLargeAsTheNoise) {
   EXPECT_FALSE(disturbances_.stands_out(candidate, 1.0));
   candidate.energy = 4.0;
   EXPECT_TRUE(disturbances_.stands_out(candidate, 1.0));
+}
+
+// Noise that is always there counts from where, bare, its largest come up to seven tenths of half a beat: a half of the
+// power at which they reach half a beat.
+TEST(SteadyNoise, CountsForWhatIsLikeNoKindWhereItComesNearToTheBeats) {
+  const EcgLevelSettings level_settings;
+  EcgLevels levels{level_settings};
+  EcgFilter filter;
+  filter.restart(from_seconds(1.0 / 250.0));
+  std::mt19937_64 generator(0x3c6ef372fe94f82bU);
+  std::normal_distribution<double> noise(0.0, 0.1);
+  for (int i = 0; i < 15 * 250; ++i) {
+    filter.push(Instant{} + from_seconds(i / 250.0), noise(generator), false);
+    levels.follow(filter, 0.0, false);
+  }
+  ASSERT_GT(levels.noise(), 0.0);
+  const DecisionSettings settings;
+  const LineDisturbances disturbances{settings, levels};
+  const auto beats_in = [&](double noisiness) {
+    QrsCandidate beat;
+    beat.energy = 3.49 * levels.noise() / (0.5 * std::sqrt(noisiness));
+    BeatLevels beats;
+    beats.learn(beat);
+    return beats;
+  };
+  EXPECT_FALSE(disturbances.near_to_beats(beats_in(0.45)));
+  EXPECT_EQ(disturbances.steady(beats_in(0.45)), 0.0);
+  EXPECT_TRUE(disturbances.near_to_beats(beats_in(0.55)));
+  EXPECT_NEAR(disturbances.steady(beats_in(0.55)), 3.0 * 0.55, 0.01);
 }
 
 TEST_F(Disturbances, ALineWithoutNoiseCountsAsNone) {

@@ -44,6 +44,9 @@ TEST(VentricularEvidence, NothingIsVentricularByOneMeasureAlone) {
   wide.narrower = -2.0;
   wide.recurs = true;
   EXPECT_LT(log_odds(wide), 0.0) << "a bundle branch";
+  wide.after_one = true;
+  wide.kind_log_rr = -0.3;
+  EXPECT_LT(log_odds(wide), 0.0) << "a bundle branch, after a ventricular beat";
 }
 
 // It is conducted: beside the wide beats of a pacemaker, or of a bundle branch block.
@@ -58,6 +61,25 @@ TEST(VentricularEvidence, WhatIsNarrowerThanTheUsualBeatIsLessLikelyVentricular)
   EXPECT_EQ(log_odds(beat), as_wide) << "what is seen for the first time may be noise";
   beat.recurs = true;
   EXPECT_GT(log_odds(beat), as_wide + 1.0);
+}
+
+// As where two kinds of ventricular beats alternate, one of which comes on time.
+TEST(VentricularEvidence, AWiderBeatRightAfterAVentricularOneIsMoreLikelyOne) {
+  const auto worth = [](double narrower, bool recurs, double kind_log_rr = -0.1) {
+    VentricularEvidence beat = usual();
+    beat.unlike = 30.0;
+    beat.narrower = narrower;
+    beat.recurs = recurs;
+    beat.kind_log_rr = kind_log_rr;
+    const double after_a_usual_one = log_odds(beat);
+    beat.after_one = true;
+    return log_odds(beat) - after_a_usual_one;
+  };
+  EXPECT_NEAR(worth(-0.3, true), 4.0, 0.5);
+  EXPECT_NEAR(worth(-0.05, true), 2.0, 0.4);
+  EXPECT_EQ(worth(0.1, true), 0.0) << "conducted";
+  EXPECT_EQ(worth(-0.3, true, -0.06), 0.0) << "a bundle branch";
+  EXPECT_EQ(worth(-0.3, false), 0.0) << "what is seen for the first time may be noise";
 }
 
 TEST(VentricularEvidence, BesideAPacemakersBeatsWhatIsNarrowAndNotFarTooEarlyIsTheHeartsOwn) {
