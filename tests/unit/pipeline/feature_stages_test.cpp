@@ -245,6 +245,57 @@ TEST_F(ChangingLooks, AreFollowedOnAndNotLearntFromOnceTheyHaveDriftedByAPixel) 
   EXPECT_LT(slot.last_told_frame, job.frame->index);
 }
 
+TEST_F(ChangingLooks, TeachAMapNothingOnceTheyHaveDriftedByHalfAPixelAndAgreeWithItOnlyNearby) {
+  constexpr int kFrames = 30;
+  for (int i = 0; i <= kFrames; ++i) next_look(static_cast<double>(i) / kFrames, {1, 0});
+  ASSERT_TRUE(slot.seen_by_last_view);
+  slot.state = SlotState::kMapped;
+  MapPrediction map;
+  map.valid = true;
+  map.covariance_W = 0.01 * Matrix3d::Identity();
+  // Sees it with what it has drifted by, where the map has it so far beside the place that is followed.
+  const auto see = [&](double drifted_px, double beside_px) {
+    slot.last_view.begin_at(drifted_px * drifted_px);
+    const Vector2d by(1, 0);
+    shift += by;
+    constexpr double kDepth_mm = 500;  // at which a pixel is a mm
+    const Vector2d mapped_px = slot.match.px + by + Vector2d(0, beside_px);
+    map.p_WF << mapped_px.x() - 120, mapped_px.y() - 100, kDepth_mm;
+    auto image = look(1, shift);
+    job.before = before->view();
+    job.image = image->view();
+    FrameRecord& frame = history->append({});
+    frame.measurable = frame.held = true;
+    job.frame = &frame;
+    motion.clear();
+    predict_and_find(slot, map, job, model, settings);
+    settle_match(slot, map, job, model, settings);
+    before = std::move(image);
+    slot.held.clear();
+    hold_match(slot, job);
+  };
+  see(0.2, 2);
+  ASSERT_TRUE(slot.seen_by_last_view);
+  ASSERT_EQ(slot.match.state, MatchState::kFound);
+  EXPECT_TRUE(slot.match_agrees) << slot.match.covariance_px2 << ", " << slot.off_px.transpose();
+  EXPECT_EQ(slot.held.size(), 1);
+  slot.converged = true;
+  see(0.7, 2);
+  EXPECT_EQ(slot.match.state, MatchState::kFound);
+  EXPECT_FALSE(slot.match_agrees);
+  EXPECT_EQ(slot.held.size(), 0);
+  EXPECT_EQ(slot.last_told_frame, job.frame->index) << "it is followed on";
+  see(0.7, 0);
+  EXPECT_TRUE(slot.match_agrees);
+  EXPECT_EQ(slot.held.size(), 0);
+  slot.converged = false;
+  see(0.7, 0);
+  EXPECT_FALSE(slot.match_agrees) << "a young map is off as often as what is loose";
+  slot.state = SlotState::kTracked;
+  see(0.7, 0);
+  EXPECT_EQ(slot.held.size(), 1) << "a start takes it";
+}
+
 TEST_F(ChangingLooks, AreNotFollowedWhereTheWayBackEndsElsewhere) {
   next_look(0, {1, 0});
   // All of it has been replaced: nothing of the frame before is there.
