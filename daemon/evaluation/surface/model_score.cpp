@@ -6,7 +6,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "core/registration/nearest_triangle.hpp"
+#include "core/geometry/nearest_triangle.hpp"
 #include "core/surface/six_elements.hpp"
 #include "daemon/evaluation/json/json_number.hpp"
 

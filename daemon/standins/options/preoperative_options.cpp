@@ -22,14 +22,8 @@ double phase_at(const HeartMotion& motion, double cycle_share) {
 
 // With its middle where the first heart's is, in the model's frame.
 TriangleMesh another_heart(const PreoperativeModel& model, std::uint64_t seed, double phase_rad) {
-  const HeartMesh heart = second_heart(seed);
-  TriangleMesh mesh;
-  mesh.vertices.resize(heart.vertex_count);
-  vertex_positions(heart, fourier_basis(phase_rad, heart.harmonics), mesh.vertices);
+  TriangleMesh mesh = surface_at(second_heart(seed), phase_rad);
   for (Vector3d& vertex : mesh.vertices) vertex = model.true_X_IW.R * vertex + model.middle_I;
-  for (std::size_t i = 0; i + 2 < heart.triangles.size(); i += 3) {
-    mesh.triangles.push_back({heart.triangles[i], heart.triangles[i + 1], heart.triangles[i + 2]});
-  }
   return mesh;
 }
 

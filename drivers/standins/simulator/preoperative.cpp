@@ -20,16 +20,6 @@ Vector3d drawn_direction(const CounterNoise& noise, std::uint64_t index) {
   return Vector3d(noise.normal(index), noise.normal(index + 1), noise.normal(index + 2)).normalized();
 }
 
-std::vector<Vector3d> normals_of(const TriangleMesh& mesh) {
-  std::vector<Vector3d> normals(mesh.vertices.size(), Vector3d::Zero());
-  for (const auto& [a, b, c] : mesh.triangles) {
-    const Vector3d normal = (mesh.vertices[b] - mesh.vertices[a]).cross(mesh.vertices[c] - mesh.vertices[a]);
-    for (const std::uint32_t v : {a, b, c}) normals[v] += normal;
-  }
-  for (Vector3d& normal : normals) normal.normalize();
-  return normals;
-}
-
 // A smooth field of RMS 1 over the vertices: waves whose vectors are drawn from a normal distribution, so that it is
 // correlated as exp(-d^2 / 2 l^2) (Rahimi & Recht, NIPS 2007).
 std::vector<double> smooth_field(const std::vector<Vector3d>& places, double length_mm, const CounterNoise& noise) {
@@ -60,14 +50,9 @@ std::string registration_text(const Pose& X_IW, const std::string& covariance, c
 }  // namespace
 
 PreoperativeModel preoperative_model(const HeartMesh& heart_W, const PreoperativeSettings& settings) {
-  TriangleMesh mesh;
-  mesh.vertices.resize(heart_W.vertex_count);
-  vertex_positions(heart_W, fourier_basis(settings.phase_rad, heart_W.harmonics), mesh.vertices);
-  for (std::size_t i = 0; i + 2 < heart_W.triangles.size(); i += 3) {
-    mesh.triangles.push_back({heart_W.triangles[i], heart_W.triangles[i + 1], heart_W.triangles[i + 2]});
-  }
+  TriangleMesh mesh = surface_at(heart_W, settings.phase_rad);
   if (settings.shape_error_mm > 0.0) {
-    const std::vector<Vector3d> normals = normals_of(mesh);
+    const std::vector<Vector3d> normals = vertex_normals(mesh);
     const std::vector<double> field =
         smooth_field(mesh.vertices, settings.shape_length_mm, CounterNoise(settings.seed, kScanShape));
     for (std::size_t v = 0; v < field.size(); ++v) mesh.vertices[v] += settings.shape_error_mm * field[v] * normals[v];
