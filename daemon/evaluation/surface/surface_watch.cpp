@@ -144,6 +144,7 @@ SurfaceFigures SurfaceWatch::figures() const {
   figures.begun = pipeline_.surface_maker().starts().begun.get();
   figures.contradicting = pipeline_.surface_maker().starts().contradicting.get();
   if (surface() == nullptr) return figures;
+  if (made_->of_model) figures.model.motion = motion_figures(*surface());
   figures.agreement_rms_mm = surface()->agreement().rms_mm;
   figures.agreement_nees = surface()->agreement().nees;
   figures.features = surface()->features();
