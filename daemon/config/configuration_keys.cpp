@@ -350,14 +350,7 @@ bool is_group_name(const std::string& text) {
 
 bool is_absolute_path(const std::string& text) { return text.starts_with('/') && text.find('\0') == std::string::npos; }
 
-void add_running(std::vector<ConfigurationKey>& keys) {
-  const auto ms = std::chrono::milliseconds(1);
-  const auto s = std::chrono::seconds(1);
-  Section("use", keys)
-      .number("display_mm", 0.1, 100, PERIMAP_MEMBER(use.display_mm),
-              "a surface may be shown where 95 % of errors are within so much; each surface says whether they are")
-      .number("measure_mm", 0.1, 100, PERIMAP_MEMBER(use.measure_mm), "likewise, to measure in it")
-      .number("contact_mm", 0.1, 100, PERIMAP_MEMBER(use.contact_mm), "likewise, to act in contact with it");
+void add_model(std::vector<ConfigurationKey>& keys) {
   const std::array<std::pair<std::string_view, double>, 2> units{{{"mm", 1.0}, {"m", 1000.0}}};
   Section("model", keys)
       .file("file", PERIMAP_MEMBER(model.file),
@@ -385,6 +378,17 @@ void add_running(std::vector<ConfigurationKey>& keys) {
           },
           [](const Configuration& configuration) { return configuration.model.other_phases; },
           "of model.other_files, each as model.phase");
+}
+
+void add_running(std::vector<ConfigurationKey>& keys) {
+  const auto ms = std::chrono::milliseconds(1);
+  const auto s = std::chrono::seconds(1);
+  Section("use", keys)
+      .number("display_mm", 0.1, 100, PERIMAP_MEMBER(use.display_mm),
+              "a surface may be shown where 95 % of errors are within so much; each surface says whether they are")
+      .number("measure_mm", 0.1, 100, PERIMAP_MEMBER(use.measure_mm), "likewise, to measure in it")
+      .number("contact_mm", 0.1, 100, PERIMAP_MEMBER(use.contact_mm), "likewise, to act in contact with it");
+  add_model(keys);
   Section("realtime", keys)
       .integer("priority", 0, 98, PERIMAP_MEMBER(realtime.priority), "SCHED_FIFO priority; 0: not requested")
       .flag("lock_memory", PERIMAP_MEMBER(realtime.lock_memory), "keeps all memory in RAM")
