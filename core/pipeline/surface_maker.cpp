@@ -54,7 +54,8 @@ void SurfaceMaker::make() {
   }
   KernelSearch search = fits_ % kFitsAKernel == 0 ? KernelSearch::kNearby : KernelSearch::kNone;
   if (fits_ == 0) search = KernelSearch::kAnew;
-  auto surface = PeriodicSurface::fit(layout_, job_.evidence, job_.camera_W_mm, {}, kernels_, search);
+  auto surface = PeriodicSurface::fit(layout_, job_.evidence, job_.camera_W_mm, {}, kernels_, search,
+                                      model_ ? model_->motion : nullptr);
   made_ = surface.has_value();
   if (surface) {
     ++fits_;

@@ -13,7 +13,7 @@
 #include <span>
 #include <utility>
 
-#include "core/registration/mesh_edges.hpp"
+#include "core/geometry/mesh_edges.hpp"
 
 namespace perimap {
 namespace {

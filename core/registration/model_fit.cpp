@@ -9,7 +9,7 @@
 #include <utility>
 
 #include "core/angle/angle.hpp"
-#include "core/registration/nearest_triangle.hpp"
+#include "core/geometry/nearest_triangle.hpp"
 #include "core/registration/residual_covariance.hpp"
 #include "core/surface/six_elements.hpp"
 

@@ -6,7 +6,7 @@
 #include <span>
 #include <vector>
 
-#include "core/registration/mesh_edges.hpp"
+#include "core/geometry/mesh_edges.hpp"
 
 namespace perimap {
 namespace {

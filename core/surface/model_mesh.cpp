@@ -40,12 +40,14 @@ struct Moving {
   PredictedMotion motion;
 };
 
-// The mean places of vertices that lie at m_W at the model's phase, and their motion there.
-Moving moving(const PeriodicSurface& surface, const Eigen::Matrix3Xd& m_W_mm, double phase_rad) {
+// The mean places of vertices that lie at m_W at the model's phase and move by themselves as `own` has it, and their
+// motion there.
+Moving moving(const PeriodicSurface& surface, const Eigen::Matrix3Xd& m_W_mm, const OwnHarmonics& own_W_mm,
+              double phase_rad) {
   const Basis b = basis_without_breath(surface.layout(), phase_rad);
   Moving at{m_W_mm, {}};
   for (int round = 0; round < kMeanPlaceRounds; ++round) {
-    at.motion = surface.motion_at(at.p_W_mm);
+    at.motion = surface.motion_at(at.p_W_mm, own_W_mm);
     const Eigen::VectorXd h = at.motion.coefficients_W_mm * b;
     at.p_W_mm = m_W_mm - Eigen::Map<const Eigen::Matrix3Xd>(h.data(), 3, m_W_mm.cols());
   }
@@ -111,23 +113,30 @@ SurfaceMesh mesh_of(const PeriodicSurface& surface, const OrganModel& model) {
   const auto V = static_cast<Eigen::Index>(at_rest.vertices.size());
   SurfaceMesh mesh;
   mesh.layout = surface.layout();
-  mesh.coefficients_W_mm.setZero(3 * V, surface.layout().size());
   mesh.covariances_W_mm2.resize(6, V);
   mesh.support.assign(at_rest.vertices.size(), Support::kUncertain);
-  const Matrix3d unknown_mm2 = surface.unknown_motion_W_mm2();
+  const OwnHarmonics own_W_mm = surface.model() != nullptr ? surface.model()->of_vertices() : OwnHarmonics();
+  const PredictedMotion unseen = surface.unseen_motion(V, own_W_mm);
+  mesh.coefficients_W_mm = unseen.coefficients_W_mm;
+  const Eigen::VectorXd from_mean_mm =
+      unseen.coefficients_W_mm * basis_without_breath(surface.layout(), model.phase_rad);
   for (Eigen::Index v = 0; v < V; ++v) {
     const auto i = static_cast<std::size_t>(v);
-    mesh.coefficients_W_mm.block<3, 1>(3 * v, 0) = at_rest.vertices[i];
+    mesh.coefficients_W_mm.block<3, 1>(3 * v, 0) = at_rest.vertices[i] - from_mean_mm.segment<3>(3 * v);
     // From its place at one phase to that at another: twice.
-    mesh.covariances_W_mm2.col(v) = to_six(model_covariance(model, model.normals_W[i]) + 2.0 * unknown_mm2);
+    mesh.covariances_W_mm2.col(v) =
+        to_six(model_covariance(model, model.normals_W[i]) + 2.0 * from_six(unseen.covariances_W_mm2.col(v)));
   }
 
   const std::vector<Eigen::Index> near = near_features(surface, model);
   Eigen::Matrix3Xd m_W_mm(3, static_cast<Eigen::Index>(near.size()));
+  OwnHarmonics own_near_W_mm(own_W_mm.rows() > 0 ? 3 * m_W_mm.cols() : 0, own_W_mm.cols());
   for (std::size_t k = 0; k < near.size(); ++k) {
-    m_W_mm.col(static_cast<Eigen::Index>(k)) = at_rest.vertices[static_cast<std::size_t>(near[k])];
+    const auto from = static_cast<Eigen::Index>(k);
+    m_W_mm.col(from) = at_rest.vertices[static_cast<std::size_t>(near[k])];
+    if (own_W_mm.rows() > 0) own_near_W_mm.middleRows<3>(3 * from) = own_W_mm.middleRows<3>(3 * near[k]);
   }
-  const Moving at = moving(surface, m_W_mm, model.phase_rad);
+  const Moving at = moving(surface, m_W_mm, own_near_W_mm, model.phase_rad);
   Eigen::Matrix3Xd normals_W(3, m_W_mm.cols());
   std::vector<Matrix3d> covariances_mm2;
   for (std::size_t k = 0; k < near.size(); ++k) {

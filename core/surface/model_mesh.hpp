@@ -12,9 +12,11 @@
 // seen, along it as the registration has it. docs/design/surface.md.
 #pragma once
 
+#include <memory>
 #include <vector>
 
 #include "core/geometry/triangle_mesh.hpp"
+#include "core/surface/model_motion.hpp"
 #include "core/surface/periodic_surface.hpp"
 #include "core/surface/surface_mesh.hpp"
 
@@ -24,14 +26,17 @@ struct OrganModel {
   TriangleMesh mesh_W;              // mm, at `phase_rad`
   std::vector<Vector3d> normals_W;  // vertex_normals() of it
   double phase_rad = 0.0;
-  double shape_mm = 1.0;         // its error along its normals, standard deviation
-  double registration_mm = 1.0;  // that of its place at the organ, in each direction
+  std::shared_ptr<const ModelMotion> motion;  // of these vertices; null: the model is of one phase
+  double shape_mm = 1.0;                      // its error along its normals, standard deviation
+  double registration_mm = 1.0;               // that of its place at the organ, in each direction
 };
 
 // All vertices of the model in its order, and those triangles whose corners are supported: features are about it, in
 // space and as the camera sees it; it faces the camera; the surface that is seen does not contradict it; and its
 // deviation along its normal is within the surface's bound. All others are kUncertain: they lie where the model has
-// them, and may move by as much as the features move anywhere. The result is a function of the arguments alone.
+// them at its phase, move as it does by itself as far as features have that motion (PeriodicSurface::unseen_motion; the
+// surface is fitted with the model's), and may move beside that by as much as features do anywhere. The result is a
+// function of the arguments alone.
 [[nodiscard]] SurfaceMesh mesh_of(const PeriodicSurface& surface, const OrganModel& model);
 
 }  // namespace perimap

@@ -44,11 +44,13 @@ tl::expected<PeriodicSurface, SurfaceRefusal> PeriodicSurface::fit(const BasisLa
                                                                    std::span<const SurfaceEvidence> evidence,
                                                                    const Vector3d& camera_W,
                                                                    const SurfaceSettings& settings,
-                                                                   const SurfaceKernels& kernels, KernelSearch search) {
+                                                                   const SurfaceKernels& kernels, KernelSearch search,
+                                                                   std::shared_ptr<const ModelMotion> model) {
   PeriodicSurface surface;
   surface.layout_ = layout;
   surface.settings_ = settings;
   surface.kernels_ = kernels;
+  surface.model_ = std::move(model);
   surface.evidence_.assign(evidence.begin(), evidence.end());
   // What contradicts the others is left out, and they are asked again: it may have hidden a second one.
   constexpr int kRounds = 3;
@@ -68,11 +70,12 @@ tl::expected<void, SurfaceRefusal> PeriodicSurface::fit_to_evidence(const Vector
   if (!depth_) return refuse(SurfaceRefusalKind::kNoKernel, "the depths of the features fit no smooth surface");
   kernels_.depth = depth_->kernel();
   const Eigen::ArrayXXd r_mm = distances(p_W_mm_, p_W_mm_);
+  const OwnHarmonics own_W_mm = own_at_features();
   for (const HarmonicGroup group : kEveryHarmonicGroup) {
     const auto [first, end] = bands_of(layout_, group);
     if (first == end) continue;
     const auto g = static_cast<std::size_t>(group);
-    motion_[g] = MotionField::fit(charted_motion(group), r_mm, kernels_.motion[g], search);
+    motion_[g] = MotionField::fit(charted_motion(group, own_W_mm), r_mm, kernels_.motion[g], search);
     if (!motion_[g]) return refuse(SurfaceRefusalKind::kNoKernel, "the motions of the features fit no smooth surface");
     kernels_.motion[g] = motion_[g]->kernels();
   }
@@ -128,13 +131,65 @@ tl::expected<void, SurfaceRefusal> PeriodicSurface::place_features(const Vector3
   return {};
 }
 
-ChartedMotion PeriodicSurface::charted_motion(HarmonicGroup group) const {
+// The model is registered at its own phase, and there the places are compared with it.
+OwnHarmonics PeriodicSurface::own_at(const Eigen::Matrix3Xd& p_W_mm) const {
+  if (!model_) return {};
+  // Where it is in the mean is some millimetres away, over which its motion hardly changes.
+  constexpr int kRounds = 2;
+  const Basis b = basis_without_breath(layout_, model_->phase_rad());
+  OwnHarmonics own_W_mm = model_->at(p_W_mm);
+  for (int round = 0; round < kRounds; ++round) {
+    Eigen::MatrixXd coefficients_W_mm = Eigen::MatrixXd::Zero(3 * p_W_mm.cols(), layout_.size());
+    for (const HarmonicGroup group : kEveryHarmonicGroup) {
+      const auto& motion = motion_[static_cast<std::size_t>(group)];
+      if (!motion || motion->gains().empty()) continue;
+      put(scaled(charted_model(own_W_mm, group), motion->gains()), group, 0, coefficients_W_mm);
+    }
+    const Eigen::VectorXd h = coefficients_W_mm * b;
+    own_W_mm = model_->at(p_W_mm + Eigen::Map<const Eigen::Matrix3Xd>(h.data(), 3, p_W_mm.cols()));
+  }
+  return own_W_mm;
+}
+
+OwnHarmonics PeriodicSurface::own_at_features() const {
+  if (!model_) return {};
+  const Basis b = basis_without_breath(layout_, model_->phase_rad());
+  Eigen::Matrix3Xd m_W_mm(3, p_W_mm_.cols());
+  for (Eigen::Index i = 0; i < m_W_mm.cols(); ++i) {
+    m_W_mm.col(i) = position_of(evidence_[static_cast<std::size_t>(i)].x, b);
+  }
+  return model_->at(m_W_mm);
+}
+
+ChartedHarmonics PeriodicSurface::charted_model(const OwnHarmonics& own_W_mm, HarmonicGroup group) const {
+  if (!model_) return {};
+  const auto [first, end] = bands_of(layout_, group);
+  const Eigen::Index V = own_W_mm.rows() / 3;
+  const Eigen::Index H = model_->harmonics();
+  ChartedHarmonics own;
+  own.across_mm.setZero(V, 4 * (end - first));
+  own.along_mm.setZero(V, 2 * (end - first));
+  const Matrix3d R_AW = chart_.X_WA.R.transpose();
+  // It breathes not, and may have fewer harmonics than the features.
+  const int most = std::min(layout_.cardiac_harmonics, model_->harmonics());
+  for (int band = first; band < std::min(end, most); ++band) {
+    for (Eigen::Index v = 0; v < V; ++v) {
+      const Vector3d cosine = R_AW * own_W_mm.block<3, 1>(3 * v, band);
+      const Vector3d sine = R_AW * own_W_mm.block<3, 1>(3 * v, H + band);
+      own.across_mm.row(v).segment<4>(4 * (band - first)) << cosine.x(), cosine.y(), sine.x(), sine.y();
+      own.along_mm.row(v).segment<2>(2 * (band - first)) << cosine.z(), sine.z();
+    }
+  }
+  return own;
+}
+
+ChartedMotion PeriodicSurface::charted_motion(HarmonicGroup group, const OwnHarmonics& own_W_mm) const {
   const auto [first, end] = bands_of(layout_, group);
   const auto N = static_cast<Eigen::Index>(evidence_.size());
   const Matrix3d R_AW = chart_.X_WA.R.transpose();
   ChartedMotion motion;
-  motion.across_mm.resize(N, 4 * (end - first));
-  motion.along_mm.resize(N, 2 * (end - first));
+  motion.seen.across_mm.resize(N, 4 * (end - first));
+  motion.seen.along_mm.resize(N, 2 * (end - first));
   motion.noise_A_mm2.resize(6, N);
   for (Eigen::Index i = 0; i < N; ++i) {
     const SurfaceEvidence& evidence = evidence_[static_cast<std::size_t>(i)];
@@ -143,12 +198,13 @@ ChartedMotion PeriodicSurface::charted_motion(HarmonicGroup group) const {
       const BandPlace place = band_place(layout_, band);
       const Vector3d cosine = R_AW * coefficients_of(evidence, layout_, place.cosine);
       const Vector3d sine = R_AW * coefficients_of(evidence, layout_, place.sine);
-      motion.across_mm.row(i).segment<4>(4 * (band - first)) << cosine.x(), cosine.y(), sine.x(), sine.y();
-      motion.along_mm.row(i).segment<2>(2 * (band - first)) << cosine.z(), sine.z();
+      motion.seen.across_mm.row(i).segment<4>(4 * (band - first)) << cosine.x(), cosine.y(), sine.x(), sine.y();
+      motion.seen.along_mm.row(i).segment<2>(2 * (band - first)) << cosine.z(), sine.z();
       noise_W += evidence.bands_mm2[static_cast<std::size_t>(band)];
     }
     motion.noise_A_mm2.col(i) = to_six(R_AW * noise_W * R_AW.transpose());
   }
+  motion.model = charted_model(own_W_mm, group);
   return motion;
 }
 
@@ -244,31 +300,39 @@ PredictedPlaces PeriodicSurface::predict(std::span<const Vector2d> places) const
   return out;
 }
 
-void PeriodicSurface::add_motion(const Eigen::Matrix3Xd& p_W_mm, Eigen::Index first, Eigen::MatrixXd& coefficients_W_mm,
-                                 Matrix6Xd& covariance_A_mm2) const {
-  const Eigen::Index V = p_W_mm.cols();
+void PeriodicSurface::put(const ChartedHarmonics& motion, HarmonicGroup group, Eigen::Index first,
+                          Eigen::MatrixXd& coefficients_W_mm) const {
   const Matrix3d& R_WA = chart_.X_WA.R;
-  const Eigen::ArrayXXd r_mm = distances(p_W_mm_, p_W_mm);
-  for (const HarmonicGroup group : kEveryHarmonicGroup) {
-    const auto& motion = motion_[static_cast<std::size_t>(group)];
-    if (!motion) continue;
-    const MotionField::Prediction predicted = motion->at(r_mm);
-    covariance_A_mm2 += predicted.covariance_A_mm2;
-    const auto [band_first, band_end] = bands_of(layout_, group);
-    for (int band = band_first; band < band_end; ++band) {
-      const BandPlace place = band_place(layout_, band);
-      const Eigen::Index b = band - band_first;
-      for (Eigen::Index v = 0; v < V; ++v) {
-        const auto across = predicted.across_mm.row(v).segment<4>(4 * b);
-        const auto along = predicted.along_mm.row(v).segment<2>(2 * b);
-        coefficients_W_mm.block<3, 1>(3 * (first + v), place.cosine) = R_WA * Vector3d(across(0), across(1), along(0));
-        coefficients_W_mm.block<3, 1>(3 * (first + v), place.sine) = R_WA * Vector3d(across(2), across(3), along(1));
-      }
+  const auto [band_first, band_end] = bands_of(layout_, group);
+  for (int band = band_first; band < band_end; ++band) {
+    const BandPlace place = band_place(layout_, band);
+    const Eigen::Index b = band - band_first;
+    for (Eigen::Index v = 0; v < motion.along_mm.rows(); ++v) {
+      const auto across = motion.across_mm.row(v).segment<4>(4 * b);
+      const auto along = motion.along_mm.row(v).segment<2>(2 * b);
+      coefficients_W_mm.block<3, 1>(3 * (first + v), place.cosine) = R_WA * Vector3d(across(0), across(1), along(0));
+      coefficients_W_mm.block<3, 1>(3 * (first + v), place.sine) = R_WA * Vector3d(across(2), across(3), along(1));
     }
   }
 }
 
+void PeriodicSurface::add_motion(const Eigen::Matrix3Xd& p_W_mm, const OwnHarmonics& own_W_mm, Eigen::Index first,
+                                 Eigen::MatrixXd& coefficients_W_mm, Matrix6Xd& covariance_A_mm2) const {
+  const Eigen::ArrayXXd r_mm = distances(p_W_mm_, p_W_mm);
+  for (const HarmonicGroup group : kEveryHarmonicGroup) {
+    const auto& motion = motion_[static_cast<std::size_t>(group)];
+    if (!motion) continue;
+    const MotionField::Prediction predicted = motion->at(r_mm, charted_model(own_W_mm, group));
+    covariance_A_mm2 += predicted.covariance_A_mm2;
+    put(predicted.motion, group, first, coefficients_W_mm);
+  }
+}
+
 PredictedMotion PeriodicSurface::motion_at(const Eigen::Matrix3Xd& p_W_mm) const {
+  return motion_at(p_W_mm, own_at(p_W_mm));
+}
+
+PredictedMotion PeriodicSurface::motion_at(const Eigen::Matrix3Xd& p_W_mm, const OwnHarmonics& own_W_mm) const {
   PredictedMotion out;
   const Eigen::Index V = p_W_mm.cols();
   out.coefficients_W_mm.setZero(3 * V, layout_.size());
@@ -277,7 +341,8 @@ PredictedMotion PeriodicSurface::motion_at(const Eigen::Matrix3Xd& p_W_mm) const
   for (Eigen::Index first = 0; first < V; first += static_cast<Eigen::Index>(kBlock)) {
     const Eigen::Index count = std::min(static_cast<Eigen::Index>(kBlock), V - first);
     Matrix6Xd covariance_A_mm2 = Matrix6Xd::Zero(6, count);
-    add_motion(p_W_mm.middleCols(first, count), first, out.coefficients_W_mm, covariance_A_mm2);
+    const OwnHarmonics own_W = model_ ? OwnHarmonics(own_W_mm.middleRows(3 * first, 3 * count)) : OwnHarmonics();
+    add_motion(p_W_mm.middleCols(first, count), own_W, first, out.coefficients_W_mm, covariance_A_mm2);
     for (Eigen::Index v = 0; v < count; ++v) {
       out.covariances_W_mm2.col(first + v) = to_six(R_WA * from_six(covariance_A_mm2.col(v)) * R_WA.transpose());
     }
@@ -285,15 +350,25 @@ PredictedMotion PeriodicSurface::motion_at(const Eigen::Matrix3Xd& p_W_mm) const
   return out;
 }
 
-Matrix3d PeriodicSurface::unknown_motion_W_mm2() const {
-  Vector3d variances_A = Vector3d::Zero();
-  for (const auto& motion : motion_) {
+PredictedMotion PeriodicSurface::unseen_motion(Eigen::Index places, const OwnHarmonics& own_W_mm) const {
+  const Matrix3d& R_WA = chart_.X_WA.R;
+  PredictedMotion out;
+  out.coefficients_W_mm.setZero(3 * places, layout_.size());
+  std::vector<Matrix3d> covariances_A_mm2(static_cast<std::size_t>(places), Matrix3d::Zero());
+  for (const HarmonicGroup group : kEveryHarmonicGroup) {
+    const auto& motion = motion_[static_cast<std::size_t>(group)];
     if (!motion) continue;
-    // Cosine and sine have half of the cycle each.
-    const double across = motion->variances_across().sum();
-    variances_A += Vector3d(across, across, motion->variances_along().sum());
+    const ChartedHarmonics own = charted_model(own_W_mm, group);
+    if (!motion->gains().empty()) put(scaled(own, motion->gains()), group, 0, out.coefficients_W_mm);
+    for (Eigen::Index v = 0; v < places; ++v) {
+      covariances_A_mm2[static_cast<std::size_t>(v)] += motion->unseen_A_mm2(own, v);
+    }
   }
-  return chart_.X_WA.R * variances_A.asDiagonal() * chart_.X_WA.R.transpose();
+  out.covariances_W_mm2.resize(6, places);
+  for (Eigen::Index v = 0; v < places; ++v) {
+    out.covariances_W_mm2.col(v) = to_six(R_WA * covariances_A_mm2[static_cast<std::size_t>(v)] * R_WA.transpose());
+  }
+  return out;
 }
 
 void PeriodicSurface::predict_block(std::span<const Vector2d> places, Eigen::Index first, PredictedPlaces& out) const {
@@ -311,7 +386,7 @@ void PeriodicSurface::predict_block(std::span<const Vector2d> places, Eigen::Ind
     const double variance_mm2 = depth.variance_mm2(v) + turning_variance_mm2(s_mm.col(v), depth.depth_mm(v));
     covariance_A_mm2.col(v) = variance_mm2 * to_six(ray_A * ray_A.transpose());
   }
-  add_motion(p_W_mm, first, out.coefficients_W_mm, covariance_A_mm2);
+  add_motion(p_W_mm, own_at(p_W_mm), first, out.coefficients_W_mm, covariance_A_mm2);
   const double bound_mm2 = settings_.largest_deviation_mm * settings_.largest_deviation_mm;
   for (Eigen::Index v = 0; v < V; ++v) {
     const Matrix3d covariance_A = from_six(covariance_A_mm2.col(v));

@@ -2,7 +2,8 @@
 // coefficients over the organ.
 //
 // The mean place at a bearing of the chart has a depth (DepthField), and the harmonics are fields over the mean place
-// in space (MotionField); low harmonics, high ones and breathing have kernels of their own. The equations are in
+// in space (MotionField); low harmonics, high ones and breathing have kernels of their own. Where a model of the organ
+// moves by itself (ModelMotion), the fields are of what features do beside it. The equations are in
 // docs/design/surface.md.
 //
 // Made off the critical path: it allocates, and takes milliseconds.
@@ -11,6 +12,7 @@
 #include <Eigen/Core>
 #include <array>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <span>
 #include <string>
@@ -21,6 +23,7 @@
 #include "core/periodic/basis.hpp"
 #include "core/surface/depth_field.hpp"
 #include "core/surface/evidence_support.hpp"
+#include "core/surface/model_motion.hpp"
 #include "core/surface/motion_field.hpp"
 #include "core/surface/surface_chart.hpp"
 #include "core/surface/surface_evidence.hpp"
@@ -78,14 +81,13 @@ struct SurfaceAgreement {
 
 class PeriodicSurface {
  public:
-  // `camera_W` (mm): where the camera has been in the mean. The kernels are those given, or learnt from them. The
-  // result is a function of the arguments alone.
-  [[nodiscard]] static tl::expected<PeriodicSurface, SurfaceRefusal> fit(const BasisLayout& layout,
-                                                                         std::span<const SurfaceEvidence> evidence,
-                                                                         const Vector3d& camera_W,
-                                                                         const SurfaceSettings& settings = {},
-                                                                         const SurfaceKernels& kernels = {},
-                                                                         KernelSearch search = KernelSearch::kAnew);
+  // `camera_W` (mm): where the camera has been in the mean. The kernels are those given, or learnt from them. `model`:
+  // how a model of the organ moves by itself, in W; null: there is none. The result is a function of the arguments
+  // alone.
+  [[nodiscard]] static tl::expected<PeriodicSurface, SurfaceRefusal> fit(
+      const BasisLayout& layout, std::span<const SurfaceEvidence> evidence, const Vector3d& camera_W,
+      const SurfaceSettings& settings = {}, const SurfaceKernels& kernels = {},
+      KernelSearch search = KernelSearch::kAnew, std::shared_ptr<const ModelMotion> model = {});
 
   [[nodiscard]] const BasisLayout& layout() const noexcept { return layout_; }
   [[nodiscard]] const SurfaceChart& chart() const noexcept { return chart_; }
@@ -107,8 +109,18 @@ class PeriodicSurface {
 
   // At mean places in space, 3 x V, mm, W.
   [[nodiscard]] PredictedMotion motion_at(const Eigen::Matrix3Xd& p_W_mm) const;
-  // Of a place that no feature tells anything of, the position's variance by its motion, W, mean over the cycle.
-  [[nodiscard]] Matrix3d unknown_motion_W_mm2() const;
+  // The same where it is known what the model does there, W.
+  [[nodiscard]] PredictedMotion motion_at(const Eigen::Matrix3Xd& p_W_mm, const OwnHarmonics& own_W_mm) const;
+  // Of places that no feature tells anything of: as much as features have of the model's motion, and no motion where
+  // there is no model. What the places do beside that is in the covariances.
+  [[nodiscard]] PredictedMotion unseen_motion(Eigen::Index places, const OwnHarmonics& own_W_mm) const;
+
+  // Null without a model that moves.
+  [[nodiscard]] const ModelMotion* model() const noexcept { return model_.get(); }
+  // What the model does at mean places, W; without rows where there is none.
+  [[nodiscard]] OwnHarmonics own_at(const Eigen::Matrix3Xd& p_W_mm) const;
+  // The same in the chart's axes, by the bands of a group.
+  [[nodiscard]] ChartedHarmonics charted_model(const OwnHarmonics& own_W_mm, HarmonicGroup group) const;
 
   [[nodiscard]] const SurfaceSettings& settings() const noexcept { return settings_; }
   [[nodiscard]] const SurfaceAgreement& agreement() const noexcept { return agreement_; }
@@ -123,17 +135,22 @@ class PeriodicSurface {
 
   [[nodiscard]] tl::expected<void, SurfaceRefusal> fit_to_evidence(const Vector3d& camera_W, KernelSearch search);
   [[nodiscard]] tl::expected<void, SurfaceRefusal> place_features(const Vector3d& camera_W);
-  [[nodiscard]] ChartedMotion charted_motion(HarmonicGroup group) const;
+  [[nodiscard]] ChartedMotion charted_motion(HarmonicGroup group, const OwnHarmonics& own_W_mm) const;
   // By how many deviations each feature is off what all others make of it; sets agreement_.
   [[nodiscard]] std::vector<double> leave_one_out();
   [[nodiscard]] bool leave_out_contradicted();
+  [[nodiscard]] OwnHarmonics own_at_features() const;
   void predict_block(std::span<const Vector2d> places, Eigen::Index first, PredictedPlaces& out) const;
   // Into the rows of places `first` and on, and on top of the covariances in the chart's axes, 6 x V.
-  void add_motion(const Eigen::Matrix3Xd& p_W_mm, Eigen::Index first, Eigen::MatrixXd& coefficients_W_mm,
-                  Matrix6Xd& covariance_A_mm2) const;
+  void add_motion(const Eigen::Matrix3Xd& p_W_mm, const OwnHarmonics& own_W_mm, Eigen::Index first,
+                  Eigen::MatrixXd& coefficients_W_mm, Matrix6Xd& covariance_A_mm2) const;
+  // Harmonics of a group into the rows of places `first` and on.
+  void put(const ChartedHarmonics& motion, HarmonicGroup group, Eigen::Index first,
+           Eigen::MatrixXd& coefficients_W_mm) const;
 
   BasisLayout layout_;
   SurfaceSettings settings_;
+  std::shared_ptr<const ModelMotion> model_;
   std::vector<SurfaceEvidence> evidence_;
   SurfaceChart chart_;
   ChartedPlaces places_;

@@ -36,7 +36,7 @@ Matrix3d of_mean(const PeriodicSurface& surface, const Vector2d& s) {
 
 // The covariance of either coefficient of a band, by the weights of its group at one place (docs/design/surface.md).
 Matrix3d of_band(const PeriodicSurface& surface, const MotionField& field, const MotionField::Weights& weights,
-                 int band, Eigen::Index of_group) {
+                 const ChartedHarmonics& by_gains, int band, Eigen::Index of_group) {
   const Matrix3d R_AW = surface.chart().X_WA.R.transpose();
   const double across = field.noise_scale_across();
   const double along = field.noise_scale_along();
@@ -57,7 +57,11 @@ Matrix3d of_band(const PeriodicSurface& surface, const MotionField& field, const
   const Matrix3d common = C.asDiagonal() * mean * C.asDiagonal() / std::max(sum, 1e-12);
   const double left_across = field.variances_across()(of_group) * weights.unexplained_across(0);
   const double left_along = field.variances_along()(of_group) * weights.unexplained_along(0);
-  return kDoubt * (Matrix3d(Vector3d(left_across, left_across, left_along).asDiagonal()) + own + common);
+  Matrix3d covariance = Matrix3d(Vector3d(left_across, left_across, left_along).asDiagonal()) + own + common;
+  if (!field.gains().empty()) {
+    covariance += gain_covariance_mm2(by_gains, field.gains()[static_cast<std::size_t>(of_group)], 0, of_group);
+  }
+  return kDoubt * covariance;
 }
 
 }  // namespace
@@ -76,14 +80,17 @@ std::optional<FeaturePrior> prior_at(const PeriodicSurface& surface, const Vecto
   const Vector3d mean_W = there.coefficients_W_mm.col(0);
   prior.factors_mm[0] = factor_of(surface.chart(), of_mean(surface, s));
   const Eigen::ArrayXXd r_mm = distances(surface.mean_places(), mean_W);
+  const OwnHarmonics own_W_mm = surface.own_at(mean_W);
   for (const HarmonicGroup group : kEveryHarmonicGroup) {
     const auto& field = surface.motion()[static_cast<std::size_t>(group)];
     if (!field) continue;
     const MotionField::Weights weights = field->weights(r_mm);
+    const ChartedHarmonics by_gains =
+        field->gains().empty() ? ChartedHarmonics() : field->by_gains(weights, surface.charted_model(own_W_mm, group));
     const auto [first, end] = bands_of(layout, group);
     for (int band = first; band < end; ++band) {
       const BandPlace place = band_place(layout, band);
-      const Matrix3d L = factor_of(surface.chart(), of_band(surface, *field, weights, band, band - first));
+      const Matrix3d L = factor_of(surface.chart(), of_band(surface, *field, weights, by_gains, band, band - first));
       prior.factors_mm[static_cast<std::size_t>(place.cosine)] = L;
       prior.factors_mm[static_cast<std::size_t>(place.sine)] = L;
     }

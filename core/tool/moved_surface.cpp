@@ -5,33 +5,12 @@
 #include <array>
 #include <cmath>
 #include <limits>
-#include <span>
 
 #include "core/geometry/nearest_shares.hpp"
 #include "core/pipeline/phase_basis.hpp"
 #include "core/pipeline/phase_spread.hpp"
-#include "core/registration/mesh_edges.hpp"
 
 namespace perimap {
-
-MeshBorder::MeshBorder(const SurfaceMesh& mesh)
-    : edges_(mesh.triangles.size(), 0), vertices_(static_cast<std::size_t>(mesh.vertices()), 0) {
-  for_each_edge(mesh.triangles, [this](std::span<const MeshSide> sides) {
-    if (sides.size() != 1) return;
-    edges_[sides[0].triangle] |= static_cast<std::uint8_t>(1U << sides[0].side);
-    vertices_[sides[0].low] = vertices_[sides[0].high] = 1;
-  });
-}
-
-bool MeshBorder::has(const SurfaceMesh& mesh, std::size_t triangle, const Vector3d& shares) const noexcept {
-  for (std::size_t k = 0; k < 3; ++k) {
-    if (shares[static_cast<Eigen::Index>(k)] >= 1.0) return vertices_[mesh.triangles[triangle][k]] != 0;
-    // The edge from corner k to the next is where the third corner has no share.
-    const bool on_edge = shares[static_cast<Eigen::Index>((k + 2) % 3)] <= 0.0;
-    if (on_edge && (edges_[triangle] >> k & 1U) != 0) return true;
-  }
-  return false;
-}
 
 MovedSurface::MovedSurface(std::size_t vertices) : positions_(static_cast<Eigen::Index>(3 * vertices)) {}
 
@@ -99,7 +78,7 @@ PlaceOnSurface MovedSurface::nearest(const MeshBorder& border, const Vector3d& p
   }
   if (!std::isfinite(least)) return place;
   place.any = true;
-  place.on_border = border.has(*mesh_, best, shares);
+  place.on_border = border.has(best, mesh_->triangles[best], shares);
   place.normal_W = normal_at(best, shares);
   for (std::size_t k = 0; k < 3; ++k) {
     const std::uint32_t vertex = mesh_->triangles[best][k];

@@ -4,8 +4,8 @@
 #include <Eigen/Core>
 #include <cstddef>
 #include <cstdint>
-#include <vector>
 
+#include "core/geometry/mesh_border.hpp"
 #include "core/geometry/pose.hpp"
 #include "core/periodic/basis.hpp"
 #include "core/phase/cardiac_clock.hpp"
@@ -13,22 +13,6 @@
 #include "core/surface/surface_mesh.hpp"
 
 namespace perimap {
-
-// Where a mesh ends: found once for each.
-class MeshBorder {
- public:
-  MeshBorder() = default;
-  // Allocates.
-  explicit MeshBorder(const SurfaceMesh& mesh);
-
-  // Whether the place with these shares of the triangle's corners is on an edge, or a corner, beyond which there is no
-  // triangle.
-  [[nodiscard]] bool has(const SurfaceMesh& mesh, std::size_t triangle, const Vector3d& shares) const noexcept;
-
- private:
-  std::vector<std::uint8_t> edges_;     // of each triangle, bit k: from corner k to the next
-  std::vector<std::uint8_t> vertices_;  // of each
-};
 
 // A place of the surface, and what is known of it there.
 struct PlaceOnSurface {

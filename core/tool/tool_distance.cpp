@@ -42,7 +42,7 @@ void ToolDistances::add(const ToolSample& sample) noexcept {
 void ToolDistances::take(const std::shared_ptr<const MadeSurface>& made) {
   if (made == made_) return;
   made_ = made;
-  border_ = made_ && made_->surface ? MeshBorder(made_->mesh) : MeshBorder();
+  border_ = made_ && made_->surface ? MeshBorder(made_->mesh.triangles, made_->mesh.support.size()) : MeshBorder();
 }
 
 // A surface that can be moved by the phases of this release.

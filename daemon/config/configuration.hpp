@@ -194,6 +194,9 @@ struct ModelConfiguration {
   double phase = 0.75;                        // when it was imaged, as a share of the heart's cycle
   double shape_mm = 1.5;                      // what its shape may be off by along its normals
   double registration_mm = 1.0;               // what its place at the organ may be off by in each direction
+  // The same mesh at other phases, so that it moves by itself; none: it is of one phase.
+  std::vector<std::filesystem::path> other_files;
+  std::vector<double> other_phases;  // of each file, as `phase`
 
   bool operator==(const ModelConfiguration&) const = default;
 };

@@ -341,20 +341,16 @@ bool is_socket_path(const std::string& text) {
   return text.starts_with('/') && text.size() <= kLongest && text.find('\0') == std::string::npos;
 }
 
+// A scan that is gated by the ECG gives 10 to 40.
+constexpr std::size_t kMostModelPhases = 64;
+
 bool is_group_name(const std::string& text) {
   return !text.empty() && text.size() <= 64 && text.find_first_of(std::string_view("\0:/ \n", 5)) == std::string::npos;
 }
 
 bool is_absolute_path(const std::string& text) { return text.starts_with('/') && text.find('\0') == std::string::npos; }
 
-void add_running(std::vector<ConfigurationKey>& keys) {
-  const auto ms = std::chrono::milliseconds(1);
-  const auto s = std::chrono::seconds(1);
-  Section("use", keys)
-      .number("display_mm", 0.1, 100, PERIMAP_MEMBER(use.display_mm),
-              "a surface may be shown where 95 % of errors are within so much; each surface says whether they are")
-      .number("measure_mm", 0.1, 100, PERIMAP_MEMBER(use.measure_mm), "likewise, to measure in it")
-      .number("contact_mm", 0.1, 100, PERIMAP_MEMBER(use.contact_mm), "likewise, to act in contact with it");
+void add_model(std::vector<ConfigurationKey>& keys) {
   const std::array<std::pair<std::string_view, double>, 2> units{{{"mm", 1.0}, {"m", 1000.0}}};
   Section("model", keys)
       .file("file", PERIMAP_MEMBER(model.file),
@@ -367,7 +363,32 @@ void add_running(std::vector<ConfigurationKey>& keys) {
               "what its shape may be off by along its normals, standard deviation")
       .number("registration_mm", 0.05, 20, PERIMAP_MEMBER(model.registration_mm),
               "what its place at the organ may be off by in each direction, standard deviation, as `perimap refine` "
-              "tells it");
+              "tells it")
+      .files(
+          "other_files", kMostModelPhases, PERIMAP_MEMBER(model.other_files),
+          "the same mesh at other phases, vertex for vertex, at least two: how the model moves by itself is then what "
+          "the surface supposes, as far as features do so too")
+      .numbers(
+          "other_phases", fmt::format("up to {} numbers from 0 to below 1", kMostModelPhases),
+          [](const std::vector<double>& phases, Configuration& configuration) {
+            const bool good = phases.size() <= kMostModelPhases &&
+                              std::all_of(phases.begin(), phases.end(), [](double p) { return p >= 0.0 && p < 1.0; });
+            if (good) configuration.model.other_phases = phases;
+            return good;
+          },
+          [](const Configuration& configuration) { return configuration.model.other_phases; },
+          "of model.other_files, each as model.phase");
+}
+
+void add_running(std::vector<ConfigurationKey>& keys) {
+  const auto ms = std::chrono::milliseconds(1);
+  const auto s = std::chrono::seconds(1);
+  Section("use", keys)
+      .number("display_mm", 0.1, 100, PERIMAP_MEMBER(use.display_mm),
+              "a surface may be shown where 95 % of errors are within so much; each surface says whether they are")
+      .number("measure_mm", 0.1, 100, PERIMAP_MEMBER(use.measure_mm), "likewise, to measure in it")
+      .number("contact_mm", 0.1, 100, PERIMAP_MEMBER(use.contact_mm), "likewise, to act in contact with it");
+  add_model(keys);
   Section("realtime", keys)
       .integer("priority", 0, 98, PERIMAP_MEMBER(realtime.priority), "SCHED_FIFO priority; 0: not requested")
       .flag("lock_memory", PERIMAP_MEMBER(realtime.lock_memory), "keeps all memory in RAM")

@@ -18,14 +18,6 @@ namespace {
 
 constexpr Duration kScoredEvery = std::chrono::seconds(1);
 
-TriangleMesh surface_of(const HeartMesh& heart, const std::vector<Vector3d>& vertices) {
-  TriangleMesh mesh{vertices, {}};
-  for (std::size_t i = 0; i + 2 < heart.triangles.size(); i += 3) {
-    mesh.triangles.push_back({heart.triangles[i], heart.triangles[i + 1], heart.triangles[i + 2]});
-  }
-  return mesh;
-}
-
 Vector3d mean_of(const SurfaceEvidence& evidence, int n) { return {evidence.x(0), evidence.x(n), evidence.x(2 * n)}; }
 
 }  // namespace
@@ -124,7 +116,7 @@ void SurfaceWatch::score_instant(const Scene& scene, std::size_t horizon, Instan
   std::vector<Vector3d> vertices(truth_.mesh().vertex_count);
   truth_.vertices_at(valid, vertices);
   if (horizon == 0 && tally_.settled() && made_->of_model) {
-    model_.add(made_->mesh, b, about, breath_mm2, surface_of(truth_.mesh(), vertices));
+    model_.add(made_->mesh, b, about, breath_mm2, surface_with(truth_.mesh(), vertices));
   }
   for (std::size_t i = 0; i < scene.places.size(); ++i) {
     if (scene.predicted.support[i] != Support::kSupported) continue;
@@ -152,6 +144,7 @@ SurfaceFigures SurfaceWatch::figures() const {
   figures.begun = pipeline_.surface_maker().starts().begun.get();
   figures.contradicting = pipeline_.surface_maker().starts().contradicting.get();
   if (surface() == nullptr) return figures;
+  if (made_->of_model) figures.model.motion = motion_figures(*surface());
   figures.agreement_rms_mm = surface()->agreement().rms_mm;
   figures.agreement_nees = surface()->agreement().nees;
   figures.features = surface()->features();

@@ -23,11 +23,16 @@ class PreoperativeOptions {
   [[nodiscard]] std::vector<std::filesystem::path> files() const;
   // That nothing is asked of a model that is not wanted. Errors name the option.
   [[nodiscard]] Expected<void> check() const;
-  // The model, another heart, where a registration starts and the true one; the folder is made where it is missing.
+  // The model at its phases, another heart, where a registration starts and the true one; the folder is made where it
+  // is missing.
   [[nodiscard]] Expected<void> write(const Simulation& simulation) const;
 
  private:
   [[nodiscard]] PreoperativeSettings settings(const Simulation& simulation) const;
+  // When the model is there too, as shares of the heart's cycle, and in which files.
+  [[nodiscard]] std::vector<double> other_shares() const;
+  [[nodiscard]] std::vector<std::string> other_names() const;
+  [[nodiscard]] std::string configuration() const;
 
   std::filesystem::path folder_;
   double cycle_share_ = 0.75;
@@ -35,6 +40,11 @@ class PreoperativeOptions {
   double shape_length_mm_ = 30.0;
   double off_mm_ = 3.0;
   double off_deg_ = 3.0;
+  int phases_ = 1;
+  double motion_shift_ = 0.0;
+  double motion_scale_ = 1.0;
+  double motion_error_ = 0.0;
+  bool other_motion_ = false;
   std::vector<std::pair<std::string, Option*>> others_;  // that mean nothing without the folder
 };
 

@@ -9,25 +9,17 @@
 #include <utility>
 #include <vector>
 
+#include "core/geometry/nearest_triangle.hpp"
 #include "drivers/standins/random/counter_noise.hpp"
+#include "drivers/standins/simulator/second_heart.hpp"
 
 namespace perimap {
 namespace {
 
-enum PreoperativeStream : std::uint64_t { kScanFrame = 7100, kScanOffset, kScanShape };
+enum PreoperativeStream : std::uint64_t { kScanFrame = 7100, kScanOffset, kScanShape, kScanMotion };
 
 Vector3d drawn_direction(const CounterNoise& noise, std::uint64_t index) {
   return Vector3d(noise.normal(index), noise.normal(index + 1), noise.normal(index + 2)).normalized();
-}
-
-std::vector<Vector3d> normals_of(const TriangleMesh& mesh) {
-  std::vector<Vector3d> normals(mesh.vertices.size(), Vector3d::Zero());
-  for (const auto& [a, b, c] : mesh.triangles) {
-    const Vector3d normal = (mesh.vertices[b] - mesh.vertices[a]).cross(mesh.vertices[c] - mesh.vertices[a]);
-    for (const std::uint32_t v : {a, b, c}) normals[v] += normal;
-  }
-  for (Vector3d& normal : normals) normal.normalize();
-  return normals;
 }
 
 // A smooth field of RMS 1 over the vertices: waves whose vectors are drawn from a normal distribution, so that it is
@@ -48,6 +40,55 @@ std::vector<double> smooth_field(const std::vector<Vector3d>& places, double len
   return field;
 }
 
+// From each vertex' place at one phase to that at another, as a second heart moves at the same place of it, whose
+// middle is the first one's.
+std::vector<Vector3d> displaced_as_another(const HeartMesh& heart_W, std::uint64_t seed, double from_rad,
+                                           double to_rad) {
+  const TriangleMesh here = surface_at(at_rest(heart_W), 0.0);
+  Vector3d middle = Vector3d::Zero();
+  for (const Vector3d& vertex : here.vertices) middle += vertex / static_cast<double>(here.vertices.size());
+  const HeartMesh other = second_heart(seed);
+  const TriangleMesh there = surface_at(at_rest(other), 0.0);
+  const TriangleMesh from = surface_at(other, from_rad);
+  const TriangleMesh to = surface_at(other, to_rad);
+  const NearestTriangle nearest(there);
+  std::vector<Vector3d> displaced;
+  for (const Vector3d& vertex : here.vertices) {
+    const NearestPlace place = nearest.to(vertex - middle);
+    Vector3d d = Vector3d::Zero();
+    for (std::size_t k = 0; k < 3; ++k) {
+      const std::uint32_t v = there.triangles[place.triangle][k];
+      d += place.shares[static_cast<Eigen::Index>(k)] * (to.vertices[v] - from.vertices[v]);
+    }
+    displaced.push_back(d);
+  }
+  return displaced;
+}
+
+// The model's vertices at another phase, in the frame of the heart.
+std::vector<Vector3d> moved_to(double phase_rad, const HeartMesh& heart_W, const TriangleMesh& scanned_W,
+                               const PreoperativeSettings& settings) {
+  const double from_rad = settings.phase_rad + settings.motion_shift_rad;
+  const double to_rad = phase_rad + settings.motion_shift_rad;
+  std::vector<Vector3d> displaced;
+  if (settings.other_motion) {
+    displaced = displaced_as_another(heart_W, settings.seed, from_rad, to_rad);
+  } else {
+    displaced = surface_at(heart_W, to_rad).vertices;
+    const std::vector<Vector3d> from = surface_at(heart_W, from_rad).vertices;
+    for (std::size_t v = 0; v < displaced.size(); ++v) displaced[v] -= from[v];
+  }
+  std::vector<double> share(displaced.size(), 0.0);
+  if (settings.motion_error > 0.0) {
+    share = smooth_field(scanned_W.vertices, settings.shape_length_mm, CounterNoise(settings.seed, kScanMotion));
+  }
+  std::vector<Vector3d> vertices = scanned_W.vertices;
+  for (std::size_t v = 0; v < vertices.size(); ++v) {
+    vertices[v] += settings.motion_scale * (1.0 + settings.motion_error * share[v]) * displaced[v];
+  }
+  return vertices;
+}
+
 std::string registration_text(const Pose& X_IW, const std::string& covariance, const Vector3d& middle_I) {
   double q[4];
   rotation_to_wxyz(X_IW.R, q);
@@ -60,14 +101,9 @@ std::string registration_text(const Pose& X_IW, const std::string& covariance, c
 }  // namespace
 
 PreoperativeModel preoperative_model(const HeartMesh& heart_W, const PreoperativeSettings& settings) {
-  TriangleMesh mesh;
-  mesh.vertices.resize(heart_W.vertex_count);
-  vertex_positions(heart_W, fourier_basis(settings.phase_rad, heart_W.harmonics), mesh.vertices);
-  for (std::size_t i = 0; i + 2 < heart_W.triangles.size(); i += 3) {
-    mesh.triangles.push_back({heart_W.triangles[i], heart_W.triangles[i + 1], heart_W.triangles[i + 2]});
-  }
+  TriangleMesh mesh = surface_at(heart_W, settings.phase_rad);
   if (settings.shape_error_mm > 0.0) {
-    const std::vector<Vector3d> normals = normals_of(mesh);
+    const std::vector<Vector3d> normals = vertex_normals(mesh);
     const std::vector<double> field =
         smooth_field(mesh.vertices, settings.shape_length_mm, CounterNoise(settings.seed, kScanShape));
     for (std::size_t v = 0; v < field.size(); ++v) mesh.vertices[v] += settings.shape_error_mm * field[v] * normals[v];
@@ -76,6 +112,11 @@ PreoperativeModel preoperative_model(const HeartMesh& heart_W, const Preoperativ
   const CounterNoise frame(settings.seed, kScanFrame);
   model.true_X_IW = {so3_exp(frame.uniform(30, 0.5, 2.5) * drawn_direction(frame, 0)),
                      frame.uniform(31, 50.0, 250.0) * drawn_direction(frame, 10)};
+  for (const double phase_rad : settings.other_phases_rad) {
+    TriangleMesh other{moved_to(phase_rad, heart_W, mesh, settings), mesh.triangles};
+    for (Vector3d& vertex : other.vertices) vertex = model.true_X_IW * vertex;
+    model.others_I.push_back(std::move(other));
+  }
   for (Vector3d& vertex : mesh.vertices) {
     vertex = model.true_X_IW * vertex;
     model.middle_I += vertex / static_cast<double>(mesh.vertices.size());

@@ -1,6 +1,7 @@
 #include "drivers/standins/truth/heart_mesh.hpp"
 
 #include <cmath>
+#include <utility>
 
 #include "drivers/text_file/csv.hpp"
 
@@ -32,6 +33,21 @@ Vector3d vertex_position(const HeartMesh& mesh, std::span<const double> basis, s
 void vertex_positions(const HeartMesh& mesh, std::span<const double> basis, std::span<Vector3d> out) noexcept {
   for (std::uint32_t vertex = 0; vertex < mesh.vertex_count; ++vertex)
     out[vertex] = vertex_position(mesh, basis, vertex);
+}
+
+TriangleMesh surface_with(const HeartMesh& mesh, std::vector<Vector3d> vertices) {
+  TriangleMesh surface{std::move(vertices), {}};
+  surface.triangles.reserve(mesh.triangles.size() / 3);
+  for (std::size_t i = 0; i + 2 < mesh.triangles.size(); i += 3) {
+    surface.triangles.push_back({mesh.triangles[i], mesh.triangles[i + 1], mesh.triangles[i + 2]});
+  }
+  return surface;
+}
+
+TriangleMesh surface_at(const HeartMesh& mesh, double phase_rad) {
+  std::vector<Vector3d> vertices(mesh.vertex_count);
+  vertex_positions(mesh, fourier_basis(phase_rad, mesh.harmonics), vertices);
+  return surface_with(mesh, std::move(vertices));
 }
 
 HeartMesh transformed(const Pose& X_AB, HeartMesh mesh_B) {

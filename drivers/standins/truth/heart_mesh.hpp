@@ -8,6 +8,7 @@
 
 #include "core/error/expected.hpp"
 #include "core/geometry/pose.hpp"
+#include "core/geometry/triangle_mesh.hpp"
 
 namespace perimap {
 
@@ -30,6 +31,11 @@ struct HeartMesh {
 
 // Positions of all vertices; `out` has vertex_count places.
 void vertex_positions(const HeartMesh& mesh, std::span<const double> basis, std::span<Vector3d> out) noexcept;
+
+// The surface with these places of the vertices, one for each.
+[[nodiscard]] TriangleMesh surface_with(const HeartMesh& mesh, std::vector<Vector3d> vertices);
+// The surface at a phase.
+[[nodiscard]] TriangleMesh surface_at(const HeartMesh& mesh, double phase_rad);
 
 // The same mesh with its coordinates mapped by X_AB from frame B to frame A.
 [[nodiscard]] HeartMesh transformed(const Pose& X_AB, HeartMesh mesh_B);

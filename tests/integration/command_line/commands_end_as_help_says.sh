@@ -50,6 +50,11 @@ fi
 ends 2 "OUT is required" simulate
 ends 2 "--tool: expected --scene heart" simulate x.mcap --scene board --tool
 ends 2 "--zoom: expected --field-stop" simulate x.mcap --zoom 2
+ends 2 "--shape-error: expected --preoperative" simulate x.mcap --shape-error 1
+ends 2 "--model-phases: expected --preoperative" simulate x.mcap --model-phases 5
+ends 2 "--model-phases: expected 1, or at least 3" simulate x.mcap --preoperative m --model-phases 2
+ends 2 "--model-phases: expected at least 3" simulate x.mcap --preoperative m --model-shift 0.2
+ends 2 "not in range" simulate x.mcap --preoperative m --model-phases 65
 ends 1 "none/x.mcap" simulate none/x.mcap --duration 1 --size 160x120
 ends 2 "key 'phase.law'" replay r.mcap -c broken.toml
 ends 1 "nothing.mcap" replay nothing.mcap

@@ -93,8 +93,8 @@ void show(const Results& results, GoalReport& report) {
 
 TrialSettings trial_with(double shape_mm, double length_mm, double common_mm, std::size_t features) {
   TrialSettings settings;
-  settings.features = features;
-  settings.common_mm = common_mm;
+  settings.seen.features = features;
+  settings.seen.common_mm = common_mm;
   settings.model.shape_error_mm = shape_mm;
   settings.model.shape_length_mm = length_mm;
   return settings;
@@ -108,7 +108,7 @@ void right_models(const HeartMesh& heart, std::uint64_t seed, int trials, GoalRe
     std::optional<double> error_goal_mm;
   };
   TrialSettings one_side = trial_with(2.0, 30.0, 0.0, 60);
-  one_side.aside_mm = 10.0;
+  one_side.seen.aside_mm = 10.0;
   for (const Case& one : {Case{"exact shape", trial_with(0.0, 30.0, 0.0, 100), 0.0, 1.0},
                           Case{"exact shape, declared 1 mm", trial_with(0.0, 30.0, 0.0, 100), 1.0, std::nullopt},
                           Case{"exact shape, 0.5 mm in common", trial_with(0.0, 30.0, 0.5, 100), 0.0, std::nullopt},
@@ -117,7 +117,7 @@ void right_models(const HeartMesh& heart, std::uint64_t seed, int trials, GoalRe
                           Case{"2 mm of shape over 45 mm", trial_with(2.0, 45.0, 0.0, 100), 2.0, std::nullopt},
                           Case{"2 mm of shape, 0.5 mm in common", trial_with(2.0, 30.0, 0.5, 100), 2.0, std::nullopt},
                           Case{"2 mm of shape, 60 features on one side", one_side, 2.0, std::nullopt}}) {
-    fmt::print("\n{}, {} features\n", one.name, one.trial.features);
+    fmt::print("\n{}, {} features\n", one.name, one.trial.seen.features);
     const Results results = run(heart, {one.trial, one.declared_mm, 30.0, {}}, seed, trials);
     show(results, report);
     if (one.error_goal_mm)

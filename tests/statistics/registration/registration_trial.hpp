@@ -6,16 +6,13 @@
 #include "core/registration/model_fit.hpp"
 #include "drivers/standins/simulator/preoperative.hpp"
 #include "drivers/standins/truth/heart_mesh.hpp"
+#include "heart_patch.hpp"
 
 namespace perimap::test {
 
 struct TrialSettings {
   std::uint64_t seed = 1;
-  std::size_t features = 100;
-  double patch_mm = 45.0;      // radius of what is seen
-  double aside_mm = 0.0;       // features lie this far beside the patch's middle and beyond, on one side
-  double feature_mm = 0.1;     // a feature's deviation across the view; twice as much along it
-  double common_mm = 0.0;      // RMS of an error that all features have in common
+  SeenSettings seen;
   PreoperativeSettings model;  // its seed and its phase are drawn
 };
 

@@ -38,7 +38,7 @@ double brute_distance(const SurfaceMesh& mesh, const Basis& b, const Vector3d& p
 
 TEST(MovedSurface, TheNearestPlaceIsThatOfABruteSearch) {
   const SurfaceMesh mesh = sheet(9);
-  const MeshBorder border(mesh);
+  const MeshBorder border(mesh.triangles, mesh.support.size());
   MovedSurface moved(100);
   std::mt19937_64 random(1);
   std::uniform_real_distribution<double> across(-25.0, 25.0), away(-15.0, 15.0), phase(0.0, 6.28);
@@ -57,7 +57,7 @@ TEST(MovedSurface, TheNearestPlaceIsThatOfABruteSearch) {
 
 TEST(MovedSurface, DistancesArePositiveInFrontAndNegativeWithin) {
   const SurfaceMesh mesh = sheet(9);
-  const MeshBorder border(mesh);
+  const MeshBorder border(mesh.triangles, mesh.support.size());
   MovedSurface moved(100);
   moved.move(mesh, phase_of(1.0), {});
   // The sheet's front looks along -z.
@@ -68,7 +68,7 @@ TEST(MovedSurface, DistancesArePositiveInFrontAndNegativeWithin) {
 
 TEST(MovedSurface, BesideTheMeshThePlaceIsOnTheBorder) {
   const SurfaceMesh mesh = sheet(9);
-  const MeshBorder border(mesh);
+  const MeshBorder border(mesh.triangles, mesh.support.size());
   MovedSurface moved(100);
   moved.move(mesh, phase_of(0.0), {});
   EXPECT_FALSE(moved.nearest(border, {0.0, 0.0, -5.0}).on_border);
@@ -80,7 +80,7 @@ TEST(MovedSurface, OverAHoleThePlaceIsOnItsBorder) {
   SurfaceMesh mesh = sheet(9);
   // A vertex in the middle and all its triangles are not known.
   std::erase_if(mesh.triangles, [](const auto& t) { return std::find(t.begin(), t.end(), 40U) != t.end(); });
-  const MeshBorder border(mesh);
+  const MeshBorder border(mesh.triangles, mesh.support.size());
   MovedSurface moved(100);
   moved.move(mesh, phase_of(0.0), {});
   EXPECT_TRUE(moved.nearest(border, {0.0, 0.0, -3.0}).on_border);
@@ -89,7 +89,7 @@ TEST(MovedSurface, OverAHoleThePlaceIsOnItsBorder) {
 
 TEST(MovedSurface, ItsVelocityIsWhatThePlaceDoes) {
   const SurfaceMesh mesh = sheet(9);
-  const MeshBorder border(mesh);
+  const MeshBorder border(mesh.triangles, mesh.support.size());
   MovedSurface moved(100);
   constexpr double kStep_s = 1e-5;
   for (double phase_rad = 0.1; phase_rad < 6.0; phase_rad += 0.7) {
@@ -110,7 +110,7 @@ TEST(MovedSurface, ItsVarianceIsTheVerticesAlongTheNormalAndThePhases) {
   mesh.covariances_W_mm2.setZero();
   mesh.covariances_W_mm2.row(0).setConstant(9.0);   // across
   mesh.covariances_W_mm2.row(5).setConstant(0.25);  // along the normal, nearly
-  const MeshBorder border(mesh);
+  const MeshBorder border(mesh.triangles, mesh.support.size());
   MovedSurface moved(100);
   PhaseEstimate phase = phase_of(0.0);
   moved.move(mesh, phase, {});
@@ -128,13 +128,16 @@ TEST(MovedSurface, ItsVarianceIsTheVerticesAlongTheNormalAndThePhases) {
 TEST(MovedSurface, SaysNothingOfAPointThatIsNoneOrOfAnEmptyMesh) {
   const SurfaceMesh mesh = sheet(3);
   MovedSurface moved(1);
-  EXPECT_FALSE(moved.nearest(MeshBorder(mesh), Vector3d::Zero()).any);
+  EXPECT_FALSE(moved.nearest(MeshBorder(mesh.triangles, mesh.support.size()), Vector3d::Zero()).any);
   moved.move(mesh, phase_of(0.0), {});
-  EXPECT_FALSE(moved.nearest(MeshBorder(mesh), {std::numeric_limits<double>::quiet_NaN(), 0.0, 0.0}).any);
+  EXPECT_FALSE(moved
+                   .nearest(MeshBorder(mesh.triangles, mesh.support.size()),
+                            {std::numeric_limits<double>::quiet_NaN(), 0.0, 0.0})
+                   .any);
   SurfaceMesh empty = mesh;
   empty.triangles.clear();
   moved.move(empty, phase_of(0.0), {});
-  EXPECT_FALSE(moved.nearest(MeshBorder(empty), Vector3d::Zero()).any);
+  EXPECT_FALSE(moved.nearest(MeshBorder(empty.triangles, empty.support.size()), Vector3d::Zero()).any);
 }
 
 }  // namespace

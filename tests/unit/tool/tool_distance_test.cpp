@@ -81,7 +81,8 @@ TEST(ToolDistances, TellHowFarTheTipIsFromTheMovedSurface) {
   MovedSurface moved(1200);
   for (std::size_t h = 0; h < kToolHorizons.size(); ++h) {
     moved.move(surface->mesh, beating().at(release().valid_time + kToolHorizons[h]), {});
-    const PlaceOnSurface place = moved.nearest(MeshBorder(surface->mesh), kBefore);
+    const PlaceOnSurface place =
+        moved.nearest(MeshBorder(surface->mesh.triangles, surface->mesh.support.size()), kBefore);
     EXPECT_EQ(told.ahead[h].state, SurfaceState::kGood);
     EXPECT_EQ(told.ahead[h].reason, ToolDistanceReason::kNone);
     EXPECT_NEAR(told.ahead[h].distance_mm, place.distance_mm, 0.05);
@@ -114,7 +115,8 @@ TEST(ToolDistances, TheirDeviationsAreRight) {
     }
     const ToolDistance told = distances.at(now, surface)[0];
     if (told.ahead[0].state != SurfaceState::kGood) continue;
-    const double error = told.ahead[0].distance_mm - moved.nearest(MeshBorder(truth->mesh), tip).distance_mm;
+    const double error = told.ahead[0].distance_mm -
+                         moved.nearest(MeshBorder(truth->mesh.triangles, truth->mesh.support.size()), tip).distance_mm;
     nees += error * error / (told.ahead[0].deviation_mm * told.ahead[0].deviation_mm);
     squares += error * error;
     ++count;
@@ -130,7 +132,8 @@ TEST(ToolDistances, ATipOnTheSurfaceTouchesAndOneBeforeItDoesNot) {
   const SurfaceRelease now = release();
   MovedSurface moved(1200);
   moved.move(surface->mesh, now.heart.at(now.valid_time), {});
-  const PlaceOnSurface place = moved.nearest(MeshBorder(surface->mesh), kBefore);
+  const PlaceOnSurface place =
+      moved.nearest(MeshBorder(surface->mesh.triangles, surface->mesh.support.size()), kBefore);
   EXPECT_TRUE(held_at(place.point_W_mm).at(now, surface)[0].touches);
   EXPECT_TRUE(held_at(place.point_W_mm - 2.0 * place.normal_W).at(now, surface)[0].touches);
   EXPECT_FALSE(held_at(place.point_W_mm + 1.0 * place.normal_W).at(now, surface)[0].touches);

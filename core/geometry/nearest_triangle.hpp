@@ -5,6 +5,7 @@
 #include <memory>
 #include <vector>
 
+#include "core/geometry/mesh_border.hpp"
 #include "core/geometry/triangle_mesh.hpp"
 
 namespace perimap {
@@ -32,9 +33,8 @@ class NearestTriangle {
 
   const TriangleMesh& mesh_;
   std::unique_ptr<const Tree> tree_;
-  std::vector<Vector3d> normals_;           // of vertices, unit
-  std::vector<std::uint8_t> border_edges_;  // of each triangle, bit k: the edge from corner k to the next
-  std::vector<std::uint8_t> on_border_;     // of each vertex
+  std::vector<Vector3d> normals_;  // of vertices, unit
+  MeshBorder border_;
 };
 
 }  // namespace perimap

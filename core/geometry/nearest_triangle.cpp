@@ -1,4 +1,4 @@
-#include "core/registration/nearest_triangle.hpp"
+#include "core/geometry/nearest_triangle.hpp"
 
 #include <Eigen/Dense>
 #include <algorithm>
@@ -6,11 +6,9 @@
 #include <boost/geometry/index/rtree.hpp>
 #include <iterator>
 #include <limits>
-#include <span>
 #include <utility>
 
 #include "core/geometry/nearest_shares.hpp"
-#include "core/registration/mesh_edges.hpp"
 
 namespace perimap {
 namespace {
@@ -31,10 +29,7 @@ struct NearestTriangle::Tree {
 };
 
 NearestTriangle::NearestTriangle(const TriangleMesh& mesh)
-    : mesh_(mesh),
-      normals_(vertex_normals(mesh)),
-      border_edges_(mesh.triangles.size(), 0),
-      on_border_(mesh.vertices.size(), 0) {
+    : mesh_(mesh), normals_(vertex_normals(mesh)), border_(mesh.triangles, mesh.vertices.size()) {
   std::vector<TreeEntry> entries;
   entries.reserve(mesh.triangles.size());
   for (std::uint32_t t = 0; t < mesh.triangles.size(); ++t) {
@@ -42,11 +37,6 @@ NearestTriangle::NearestTriangle(const TriangleMesh& mesh)
     const Vector3d &a = mesh.vertices[triangle[0]], &b = mesh.vertices[triangle[1]], &c = mesh.vertices[triangle[2]];
     entries.emplace_back(TreeBox(tree_point(a.cwiseMin(b).cwiseMin(c)), tree_point(a.cwiseMax(b).cwiseMax(c))), t);
   }
-  for_each_edge(mesh.triangles, [this](std::span<const MeshSide> sides) {
-    if (sides.size() != 1) return;
-    border_edges_[sides[0].triangle] |= static_cast<std::uint8_t>(1U << sides[0].side);
-    on_border_[sides[0].low] = on_border_[sides[0].high] = 1;
-  });
   tree_ = std::make_unique<const Tree>(entries);
 }
 
@@ -84,14 +74,10 @@ NearestPlace NearestTriangle::to(const Vector3d& p) const {
   const auto& triangle = mesh_.triangles[best.triangle];
   best.normal = Vector3d::Zero();
   for (std::size_t k = 0; k < 3; ++k) {
-    const auto i = static_cast<Eigen::Index>(k);
-    best.normal += best.shares[i] * normals_[triangle[k]];
-    const bool at_corner = best.shares[i] >= 1.0 && on_border_[triangle[k]] != 0;
-    // The edge from corner k to the next is where the third corner has no share.
-    const bool on_edge = best.shares[static_cast<Eigen::Index>((k + 2) % 3)] <= 0.0;
-    best.on_border = best.on_border || at_corner || (on_edge && (border_edges_[best.triangle] >> k & 1U) != 0);
+    best.normal += best.shares[static_cast<Eigen::Index>(k)] * normals_[triangle[k]];
   }
   best.normal.normalize();
+  best.on_border = border_.has(best.triangle, triangle, best.shares);
   return best;
 }
 
