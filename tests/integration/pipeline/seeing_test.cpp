@@ -198,13 +198,20 @@ double quantile(std::vector<double> values, double share) {
   return *at;
 }
 
+// As many features as one picture takes, so that those that are missing are missing in it.
+PipelineSettings settings_for(const Simulation& simulation, const TrackerNoise& noise) {
+  PipelineSettings settings = test::settings_for(simulation, noise);
+  settings.features.maximum = 120;
+  return settings;
+}
+
 // A pipeline with a tracker of this noise, and what it sees.
 class Session {
  public:
   Session(const Simulation& simulation, const TrackerNoise& noise)
       : simulation_(simulation),
         noise_(noise),
-        pipeline_(test::settings_for(simulation, noise)),
+        pipeline_(settings_for(simulation, noise)),
         runtime_(pipeline_, Identity{}, Duration(0), publication_),
         watch_(simulation, pipeline_) {}
 
