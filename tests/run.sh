@@ -6,7 +6,7 @@ cd "$(dirname "$0")/.."
 usage() {
   cat << 'END'
 tests/run.sh [--full [PART...]] [--jobs N]
-  Installs the packages, builds the presets quick and asan, runs their tests. About twenty minutes on two cores.
+  Installs the packages, builds the presets quick and asan, runs their tests. About twenty-five minutes on two cores.
   Each test but those labelled `long` runs once: what reads the bytes of files, devices and messages under
   AddressSanitizer, all else without sanitizers.
   --full    everything, or the parts named. Some hours on two cores that do nothing else.
