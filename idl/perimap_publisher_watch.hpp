@@ -102,7 +102,7 @@ class PublisherWatch {
 
  private:
   enum Topic : std::size_t { kSurfaces, kModels, kMeshes, kPhases, kStatuses, kTools, kTopics };
-  // Each tool has sequence numbers of its own. Of more of them that are heard in turn none is followed.
+  // Each tool has sequence numbers of its own. Of more of them than this that are heard in turn those are not compared.
   static constexpr std::size_t kToolLanes = 16;
   static constexpr std::size_t kStreams = 2;
   static constexpr std::int64_t kMeshAlone_ns = 3 * kAlone_ns;  // one comes a second

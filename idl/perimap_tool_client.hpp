@@ -17,6 +17,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <iterator>
 #include <limits>
 
 namespace perimap::client {
@@ -51,6 +52,12 @@ inline constexpr std::array<std::int64_t, perimap_TOOL_HORIZONS> kToolHorizons_n
 inline constexpr double kTouches_mm = 0.5;
 
 inline bool usable(std::uint8_t state) noexcept { return state == perimap_TOOL_DEGRADED || state == perimap_TOOL_GOOD; }
+
+// Of a sample with another value nothing is used (perimap_tool.idl).
+inline bool known_states(const perimap_ToolDistance& tool) noexcept {
+  return std::all_of(std::begin(tool.states), std::end(tool.states),
+                     [](std::uint8_t state) { return state <= perimap_TOOL_GOOD; });
+}
 
 inline bool sound(const perimap_ToolDistance& tool, std::size_t horizon) noexcept {
   return std::isfinite(tool.distances_mm[horizon]) && std::isfinite(tool.deviations_mm[horizon]) &&
@@ -96,11 +103,12 @@ inline ToolAtInstant distance_at(const perimap_ToolDistance& tool, std::int64_t 
   if (ahead_ns < 0 || ahead_ns > horizons.back()) return refuse(ToolRefusal::kOtherTime);
   while (horizons[after] < ahead_ns) ++after;
   const std::size_t before = horizons[after] == ahead_ns ? after : after - 1;
+  if (!detail::known_states(tool)) return refuse(ToolRefusal::kMalformed);
   if (tool.tip_known) detail::take_tip(tool, static_cast<double>(ahead_ns) / 1e9, out);
   for (const std::size_t horizon : {before, after}) {
     if (!detail::usable(tool.states[horizon])) {
       out.reason = tool.reasons[horizon];
-      return refuse(tool.states[horizon] == perimap_TOOL_INVALID ? ToolRefusal::kPublisher : ToolRefusal::kMalformed);
+      return refuse(ToolRefusal::kPublisher);
     }
     if (!detail::sound(tool, horizon)) return refuse(ToolRefusal::kMalformed);
   }

@@ -330,8 +330,9 @@ bool is_wanted_for_start(const FeatureSlot& slot, const FrameJob& job) noexcept 
 
 void hold_match(FeatureSlot& slot, const FrameJob& job) noexcept {
   if (slot.state == SlotState::kEmpty || slot.match.state != MatchState::kFound || !job.frame->measurable) return;
-  if (slot.pressed || (slot.state == SlotState::kMapped ? !tells_map(slot.match) : is_vague(slot.match))) return;
-  if (job.frame->held && (slot.state != SlotState::kTracked || is_wanted_for_start(slot, job))) {
+  if (slot.pressed || is_vague(slot.match)) return;
+  const bool teaches = slot.state != SlotState::kMapped || tells_map(slot.match);
+  if (teaches && job.frame->held && (slot.state != SlotState::kTracked || is_wanted_for_start(slot, job))) {
     const PixelMap& picture = job.frame->picture;
     slot.held.push(
         {job.frame->index, picture.to_lens(slot.match.px), picture.covariance_to_lens(slot.match.covariance_px2)});

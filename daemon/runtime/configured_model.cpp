@@ -130,8 +130,11 @@ tl::expected<std::shared_ptr<const ModelMotion>, WrongKeys> motion_of(const Mode
 
 tl::expected<std::shared_ptr<const OrganModel>, WrongKeys> configured_model(const ModelConfiguration& configuration) {
   if (!configuration.file) {
-    if (configuration.other_files.empty()) return nullptr;
-    return wrong("model.other_files", "expected model.file beside it, whose other phases these are, got none");
+    const char* const needs = !configuration.other_files.empty()    ? "model.other_files"
+                              : !configuration.other_phases.empty() ? "model.other_phases"
+                                                                    : nullptr;
+    if (needs == nullptr) return nullptr;
+    return wrong(needs, "expected model.file beside it, whose other phases these are, got none");
   }
   auto mesh = read_checked(*configuration.file, configuration.unit_mm);
   if (!mesh) return wrong("model.file", std::move(mesh.error().message));

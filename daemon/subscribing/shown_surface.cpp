@@ -119,7 +119,7 @@ ShownSurface SurfaceGate::show(const perimap_Surface& surface, Instant receipt) 
   } else {
     shown.state = perimap_SURFACE_INVALID;  // also one that this program does not know
   }
-  shown.tools = tools_.at(shown.valid, receipt, shown.usable());
+  shown.tools = tools_.at(shown.valid, receipt, shown.state);
   if (shown.state != perimap_SURFACE_GOOD) {
     shown.why = client::describe(shown.reason);
     shown.remedy = remedy_of(shown.reason);

@@ -13,19 +13,25 @@ namespace {
 // So long a tool that perimapd tells nothing of any more is said to be missing.
 constexpr Duration kMissed = std::chrono::seconds(10);
 
-ShownTool shown(const perimap_ToolDistance& told, Instant valid, Instant now, bool usable) {
+ShownTool shown(const perimap_ToolDistance& told, Instant valid, Instant now, perimap_SurfaceState surface) {
   ShownTool tool;
   tool.name = told.tool;
-  if (!usable) {
+  if (surface != perimap_SURFACE_GOOD && surface != perimap_SURFACE_DEGRADED) {
     tool.at.refusal = client::ToolRefusal::kPublisher;
     tool.at.reason = perimap_TOOL_REASON_SURFACE;
     return tool;
   }
   tool.at = client::distance_at(told, to_ns(valid), to_ns(now));
-  const double* p = told.nearest_W_mm;
-  if (tool.at.refusal == client::ToolRefusal::kNone && std::isfinite(p[0] + p[1] + p[2])) {
-    tool.nearest_W_mm = {p[0], p[1], p[2]};
+  if (surface == perimap_SURFACE_DEGRADED && tool.at.state == perimap_TOOL_GOOD) {
+    tool.at.state = perimap_TOOL_DEGRADED;
+    tool.at.reason = perimap_TOOL_REASON_SURFACE;
   }
+  if (tool.at.refusal != client::ToolRefusal::kNone || !tool.at.tip_known) return tool;
+  std::array<double, 3> nearest{};
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    nearest[axis] = tool.at.tip_W_mm[axis] - tool.at.distance_mm * told.normal_W[axis];
+  }
+  if (std::isfinite(nearest[0] + nearest[1] + nearest[2])) tool.nearest_W_mm = nearest;
   return tool;
 }
 
@@ -45,11 +51,11 @@ void ShownTools::take(const perimap_ToolDistance& told) {
   tools_.emplace(name, told);
 }
 
-std::vector<ShownTool> ShownTools::at(Instant valid, Instant now, bool usable) const {
+std::vector<ShownTool> ShownTools::at(Instant valid, Instant now, perimap_SurfaceState surface) const {
   std::vector<ShownTool> tools;
   for (const auto& [name, told] : tools_) {
     if (wrapped_difference(to_ns(now), told.valid_until_ns) > kMissed.count()) continue;
-    tools.push_back(shown(told, valid, now, usable));
+    tools.push_back(shown(told, valid, now, surface));
   }
   return tools;
 }

@@ -8,6 +8,7 @@
 #include <igtlTransformMessage.h>
 
 #include <cstring>
+#include <limits>
 #include <string_view>
 #include <vector>
 
@@ -177,7 +178,8 @@ IgtlOutgoing pack_tools(const ShownSurface& surface) {
     lines.push_back(static_cast<float>(line));
     distances.push_back(static_cast<float>(at.distance_mm));
     deviations.push_back(static_cast<float>(at.deviation_mm));
-    touches.push_back(at.touches ? 1.0F : 0.0F);
+    const bool told = at.refusal == client::ToolRefusal::kNone;
+    touches.push_back(!told ? std::numeric_limits<float>::quiet_NaN() : at.touches ? 1.0F : 0.0F);
   }
   if (!tips.empty()) {
     add_points(tips, *message->GetPoints());

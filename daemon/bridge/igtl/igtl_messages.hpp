@@ -63,8 +63,8 @@ struct IgtlState {
 // TRANSFORM X_WC, mm, stamped with the UTC of the capture. The surface's X_WC must be there.
 [[nodiscard]] IgtlOutgoing pack_camera(const ShownSurface& surface);
 // POLYDATA: the tip of each tracked tool that is known as a vertex, in mm of W, stamped as the surface. The points'
-// scalars: "line", that of the tool in pack_tool_words(), from 0 on; "distance_mm" from the surface and "deviation_mm",
-// not a number where nobody knows; "touches", 0 or 1. Empty where nothing may be shown: an empty POINT is none to
+// scalars: "line", that of the tool in pack_tool_words(), from 0 on; and, not a number where nobody knows, "distance_mm"
+// from the surface, "deviation_mm" and "touches", 0 or 1. Empty where nothing may be shown: an empty POINT is none to
 // libopenigtlink, and would clear nothing.
 [[nodiscard]] IgtlOutgoing pack_tools(const ShownSurface& surface);
 // STRING: a line for each tool, how far it is from the surface, or why nobody knows.

@@ -104,11 +104,20 @@ void Ros2Bridge::tell(const ShownSurface& surface) {
 // On a change, and else once a second.
 void Ros2Bridge::diagnose(const ShownSurface& surface, Ros2Level level, const std::string& words) {
   const Instant now = MonotonicClock::now();
-  if (level == level_ && words == words_ && now - diagnosed_ < kSayAgain) return;
+  std::vector<Ros2ToolStatus> tools = ros2_tools(surface);
+  // One that was told of before and is not any more is said to be stale, once: viewers keep what they heard last.
+  std::vector<std::string> gone;
+  for (const Ros2ToolStatus& before : tools_) {
+    const bool there = std::any_of(tools.begin(), tools.end(), [&](const auto& t) { return t.name == before.name; });
+    if (!there) gone.push_back(before.name);
+  }
+  if (level == level_ && words == words_ && tools == tools_ && now - diagnosed_ < kSayAgain) return;
+  tools_ = std::move(tools);
   level_ = level;
   words_ = words;
   diagnosed_ = now;
-  write(writers_.diagnostics, &messages_.diagnostics(surface, level, words, utc_now()), ros2_topics::kDiagnostics);
+  write(writers_.diagnostics, &messages_.diagnostics(surface, level, words, gone, utc_now()),
+        ros2_topics::kDiagnostics);
 }
 
 void Ros2Bridge::clear(Ros2Level level, std::string_view words) {

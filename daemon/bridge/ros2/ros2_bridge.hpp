@@ -7,6 +7,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "core/error/expected.hpp"
 #include "core/time/instant.hpp"
@@ -62,7 +63,8 @@ class Ros2Bridge {
   ShownSurface nothing_;  // of the last source and frame
   Instant transformed_;   // the last capture whose camera was told
   std::optional<Ros2Level> level_;
-  std::string words_;  // of the last diagnostics
+  std::string words_;                  // of the last diagnostics
+  std::vector<Ros2ToolStatus> tools_;  // likewise
   Instant diagnosed_;
   Instant until_;    // what was sent may be used; the clock's epoch: nothing has come
   Instant cleared_;  // when it was said last that nothing comes

@@ -59,6 +59,17 @@ std_msgs_msg_dds__ColorRGBA_ to_ros2(const foxglove_Color& c) {
 
 }  // namespace
 
+std::vector<Ros2ToolStatus> ros2_tools(const ShownSurface& surface) {
+  std::vector<Ros2ToolStatus> tools;
+  for (const ShownTool& tool : surface.tools) {
+    const Ros2Level level = tool.at.state == perimap_TOOL_GOOD       ? Ros2Level::kOk
+                            : tool.at.state == perimap_TOOL_DEGRADED ? Ros2Level::kWarning
+                                                                     : Ros2Level::kError;
+    tools.push_back({tool.name, level, tool.at.touches});
+  }
+  return tools;
+}
+
 Ros2Level ros2_level(const ShownSurface& surface) noexcept {
   if (surface.state == perimap_SURFACE_GOOD) return Ros2Level::kOk;
   return surface.usable() ? Ros2Level::kWarning : Ros2Level::kError;
@@ -161,19 +172,22 @@ const Ros2Transforms& Ros2Messages::transforms(const ShownSurface& surface, Inst
   return transforms_;
 }
 
-void Ros2Messages::add_tool_statuses(const ShownSurface& surface) {
+void Ros2Messages::add_tool_statuses(const ShownSurface& surface, const std::vector<std::string>& gone) {
   tool_texts_.clear();
+  std::vector<Ros2Level> levels;
+  for (const Ros2ToolStatus& tool : ros2_tools(surface)) levels.push_back(tool.level);
   for (const ShownTool& tool : surface.tools) {
     tool_texts_.push_back(fmt::format("perimap: tool {}", tool.name));
     tool_texts_.push_back(tool_words(tool.name, tool.at));
   }
-  for (std::size_t i = 0; i < surface.tools.size(); ++i) {
-    const std::uint8_t state = surface.tools[i].at.state;
-    const Ros2Level level = state == perimap_TOOL_GOOD       ? Ros2Level::kOk
-                            : state == perimap_TOOL_DEGRADED ? Ros2Level::kWarning
-                                                             : Ros2Level::kError;
+  for (const std::string& name : gone) {
+    levels.push_back(Ros2Level::kStale);
+    tool_texts_.push_back(fmt::format("perimap: tool {}", name));
+    tool_texts_.push_back(fmt::format("{}: nothing is told of it any more", name));
+  }
+  for (std::size_t i = 0; i < levels.size(); ++i) {
     diagnostic_msgs_msg_dds__DiagnosticStatus_ status{};
-    status.level = static_cast<std::uint8_t>(level);
+    status.level = static_cast<std::uint8_t>(levels[i]);
     status.name = lent(tool_texts_[2 * i]);
     status.message = lent(tool_texts_[2 * i + 1]);
     status.hardware_id = lent(texts_[1]);
@@ -182,7 +196,7 @@ void Ros2Messages::add_tool_statuses(const ShownSurface& surface) {
 }
 
 const Ros2Diagnostics& Ros2Messages::diagnostics(const ShownSurface& surface, Ros2Level level, std::string_view words,
-                                                 Instant now_utc) {
+                                                 const std::vector<std::string>& gone, Instant now_utc) {
   const auto converged = [](const ShownFeature& feature) { return feature.state == perimap_FEATURE_CONVERGED; };
   diagnostics_ = {};
   diagnostics_.header = header(surface, surface.valid, now_utc);
@@ -204,7 +218,7 @@ const Ros2Diagnostics& Ros2Messages::diagnostics(const ShownSurface& surface, Ro
   status.hardware_id = lent(texts_[1]);
   lend(values_, status.values);
   statuses_.assign(1, status);
-  add_tool_statuses(surface);
+  add_tool_statuses(surface, gone);
   lend(statuses_, diagnostics_.status);
   return diagnostics_;
 }

@@ -33,8 +33,9 @@ class Ros2Messages {
   [[nodiscard]] const Ros2Transforms& transforms(const ShownSurface& surface, Instant now_utc);
   // What may be trusted, and why not, and how far each tracked tool is. `level` and `words` tell more than the surface
   // where it does not come any more.
+  // `gone`: names of tools that were told of before, and are not any more.
   [[nodiscard]] const Ros2Diagnostics& diagnostics(const ShownSurface& surface, Ros2Level level, std::string_view words,
-                                                   Instant now_utc);
+                                                   const std::vector<std::string>& gone, Instant now_utc);
 
  private:
   struct Names {
@@ -43,7 +44,7 @@ class Ros2Messages {
   };
   // Without points: what takes away what was shown.
   Ros2Marker marker(const ShownSurface& surface, Instant now_utc);
-  void add_tool_statuses(const ShownSurface& surface);
+  void add_tool_statuses(const ShownSurface& surface, const std::vector<std::string>& gone);
   Ros2Header header(const ShownSurface& surface, Instant on_publishers_clock, Instant now_utc);
 
   Names names_;
@@ -64,6 +65,16 @@ class Ros2Messages {
   std::vector<std::string> texts_;
   std::vector<std::string> tool_texts_;  // of each its name and its words
 };
+
+// What of a tool is told at once when it changes; its distance goes with the next message.
+struct Ros2ToolStatus {
+  std::string name;
+  Ros2Level level = Ros2Level::kError;
+  bool touches = false;
+
+  bool operator==(const Ros2ToolStatus&) const = default;
+};
+[[nodiscard]] std::vector<Ros2ToolStatus> ros2_tools(const ShownSurface& surface);
 
 // ok, warning or error: good, degraded or neither.
 [[nodiscard]] Ros2Level ros2_level(const ShownSurface& surface) noexcept;

@@ -157,7 +157,7 @@ Json SurfaceTeller::tell(const perimap_Surface& surface, Instant receipt) {
                {"valid_for_ms", page_ms(surface.valid_until_ns) - page_ms(to_ns(receipt))},
                {"phase_rad", rounded(surface.cardiac_phase_rad)},
                {"phase_deviation_rad", rounded(surface.cardiac_phase_deviation_rad)}};
-  json["tools"] = tools_json(tools_.at(from_ns(surface.valid_time_ns), receipt, usable));
+  json["tools"] = tools_json(tools_.at(from_ns(surface.valid_time_ns), receipt, surface.state));
   if (!usable) return json;
   json["camera"] = camera_json(surface);
   json["features"] = std::move(told.features);

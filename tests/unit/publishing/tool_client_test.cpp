@@ -116,8 +116,9 @@ TEST(ToolClient, NumbersThatNoPerimapdSendsAreRefused) {
   tool.deviations_mm[0] = -0.1;
   expect_refused(at(tool, 0), ToolRefusal::kMalformed);
   tool = made_tool(kTime);
-  tool.states[0] = 3;
+  tool.states[2] = 3;  // nothing of it is used, be it beside another instant
   expect_refused(at(tool, 0), ToolRefusal::kMalformed);
+  EXPECT_FALSE(at(tool, 0).tip_known);
   tool = made_tool(kTime);
   tool.distances_mm[0] = std::numeric_limits<double>::max();
   tool.distances_mm[1] = -std::numeric_limits<double>::max();

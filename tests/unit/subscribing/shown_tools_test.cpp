@@ -31,18 +31,18 @@ TEST(ShownTools, EachIsToldForTheInstantOfTheSurface) {
   tools.take(made_tool(to_ns(kNow), "pointer"));
   tools.take(made_tool(to_ns(kNow), "instrument/probe"));
   tools.take(made_tool(to_ns(kNow + 33ms), "instrument/probe", 2));
-  const auto shown = tools.at(kNow + 50ms, kNow + 50ms, true);
+  const auto shown = tools.at(kNow + 50ms, kNow + 50ms, perimap_SURFACE_GOOD);
   ASSERT_THAT(names(shown), ElementsAre("instrument/probe", "pointer"));
   EXPECT_NEAR(shown[0].at.distance_mm, 3.0 - 10.0 * 0.017, 1e-9);  // by its newer sample
   EXPECT_NEAR(shown[1].at.distance_mm, 3.0 - 10.0 * 0.050, 1e-9);
   ASSERT_TRUE(shown[0].nearest_W_mm);
-  EXPECT_EQ((*shown[0].nearest_W_mm)[2], 100.0);
+  EXPECT_NEAR((*shown[0].nearest_W_mm)[2], 97.0 + shown[0].at.distance_mm, 1e-9);
 }
 
 TEST(ShownTools, BesideASurfaceThatMayNotBeUsedNothingButTheNameIsTold) {
   ShownTools tools;
   tools.take(made_tool(to_ns(kNow)));
-  const auto shown = tools.at(kNow, kNow, false);
+  const auto shown = tools.at(kNow, kNow, perimap_SURFACE_INVALID);
   ASSERT_EQ(shown.size(), 1U);
   EXPECT_EQ(shown[0].at.state, perimap_TOOL_INVALID);
   EXPECT_FALSE(shown[0].at.tip_known);
@@ -50,20 +50,30 @@ TEST(ShownTools, BesideASurfaceThatMayNotBeUsedNothingButTheNameIsTold) {
   EXPECT_STREQ(client::describe(shown[0].at), "the surface is not good");
 }
 
+TEST(ShownTools, NoDistanceIsWorthMoreThanTheSurfaceBesideIt) {
+  ShownTools tools;
+  tools.take(made_tool(to_ns(kNow)));
+  EXPECT_EQ(tools.at(kNow, kNow, perimap_SURFACE_GOOD)[0].at.state, perimap_TOOL_GOOD);
+  const auto shown = tools.at(kNow, kNow, perimap_SURFACE_DEGRADED);
+  EXPECT_EQ(shown[0].at.state, perimap_TOOL_DEGRADED);
+  EXPECT_EQ(shown[0].at.distance_mm, 3.0);
+  EXPECT_STREQ(client::describe(shown[0].at), "the surface is not good");
+}
+
 TEST(ShownTools, OneThatIsTooOldSaysSoForAWhileAndGoesThen) {
   ShownTools tools;
   tools.take(made_tool(to_ns(kNow)));
-  const auto late = tools.at(kNow + 5s, kNow + 5s, true);
+  const auto late = tools.at(kNow + 5s, kNow + 5s, perimap_SURFACE_GOOD);
   ASSERT_EQ(late.size(), 1U);
   EXPECT_EQ(late[0].at.refusal, client::ToolRefusal::kStale);
   EXPECT_FALSE(late[0].at.tip_known);
-  EXPECT_TRUE(tools.at(kNow + 11s, kNow + 11s, true).empty());
+  EXPECT_TRUE(tools.at(kNow + 11s, kNow + 11s, perimap_SURFACE_GOOD).empty());
 }
 
 TEST(ShownTools, NamesWithoutEndTakeNoMemory) {
   ShownTools tools;
   for (int i = 0; i < 1000; ++i) tools.take(made_tool(to_ns(kNow) + i, "instrument/" + std::to_string(i)));
-  const auto shown = names(tools.at(kNow, kNow, true));
+  const auto shown = names(tools.at(kNow, kNow, perimap_SURFACE_GOOD));
   EXPECT_EQ(shown.size(), ShownTools::kMost);
   EXPECT_THAT(shown, testing::Contains("instrument/999"));
 }
