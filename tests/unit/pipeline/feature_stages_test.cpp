@@ -266,6 +266,7 @@ TEST_F(ChangingLooks, TeachAMapNothingOnceTheyHaveDriftedByHalfAPixelAndAgreeWit
     job.image = image->view();
     FrameRecord& frame = history->append({});
     frame.measurable = frame.held = true;
+    frame.stamp.capture = slot.last_observed + std::chrono::milliseconds(33);
     job.frame = &frame;
     motion.clear();
     predict_and_find(slot, map, job, model, settings);
@@ -285,9 +286,11 @@ TEST_F(ChangingLooks, TeachAMapNothingOnceTheyHaveDriftedByHalfAPixelAndAgreeWit
   EXPECT_FALSE(slot.match_agrees);
   EXPECT_EQ(slot.held.size(), 0);
   EXPECT_EQ(slot.last_told_frame, job.frame->index) << "it is followed on";
+  EXPECT_LT(slot.last_observed, job.frame->stamp.capture);
   see(0.7, 0);
   EXPECT_TRUE(slot.match_agrees);
   EXPECT_EQ(slot.held.size(), 0);
+  EXPECT_EQ(slot.last_observed, job.frame->stamp.capture) << "it has been seen where the map has it";
   slot.converged = false;
   see(0.7, 0);
   EXPECT_FALSE(slot.match_agrees) << "a young map is off as often as what is loose";
